@@ -29,6 +29,7 @@ from .parts import (
     Leg,
     Parameter,
     PathStructure,
+    PoseSetting,
     PoseSymbols,
     Quantity,
     Unknown,
@@ -74,6 +75,7 @@ class Model(Whole, Shown):
         structure: structure of each chain of joints; empty for a robot given by its rows.
         length_unit: unit of the typical lengths, such as ``m``; empty for proportions in any unit.
         size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
+        settings: parameters that follow the pose, see :mod:`.posesettings`; empty for a robot as its function made it.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -107,6 +109,7 @@ class Model(Whole, Shown):
     structure: tuple[PathStructure, ...] = ()
     length_unit: str = ""
     size: SX | None = None
+    settings: tuple[PoseSetting, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))

@@ -73,6 +73,23 @@ class Parameter:
         return component_names(self.name, self.symbol.numel())
 
 
+@dataclass(frozen=True)
+class PoseSetting:
+    """Component of a parameter that is an affine function of the platform's position.
+
+    Attributes:
+        name: name of the component.
+        lower: smallest value of the setting's range; radians for an angle.
+        upper: largest value of this range.
+        centre: (3,) position at which the setting has the value of the parameter, length.
+    """
+
+    name: str
+    lower: float
+    upper: float
+    centre: tuple[float, float, float]
+
+
 @dataclass(frozen=True, eq=False)
 class Unknown:
     """Unknown that the closure equations determine, such as a passive joint coordinate.

@@ -31,14 +31,15 @@ from .names import name_of_task, parameter_name, pose_prefixes
 from .parameters import check_choices, check_parameters
 from .pathfile import TURN, PathFile
 from .pertask import Station, check_poses, common_poses, common_value, stations, task_value
-from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
+from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerPose, PerTask, Pose, Rotation, Value
 from .posechecks import check_displacements, check_further_poses, check_position, check_rotation
+from .posesettings import check_pose_settings, with_settings_resolved
 from .radians import angles_of, check_radians, with_radians
 from .schedule import check_settings
 from .settings import Expectation, Published, Search
 from .task import MEASURES, Method, Task
 from .taskchecks import check_loading, check_tasks
-from .workspace import Workspace
+from .workspace import PoseSettings, Workspace
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -50,8 +51,9 @@ class Case(Whole, Shown):
 
     Attributes:
         model: robot of the case.
-        parameters: value of each parameter of the robot by name: a number, :class:`Free` or :class:`PerTask`, or a
-            sequence of three for a point or direction; stored as tuples of components.
+        parameters: value of each parameter of the robot by name: a number, :class:`Free`, :class:`PerTask` or
+            :class:`PerPose`, or a sequence of three for a point or direction; stored as tuples of components. A
+            :class:`PerPose` becomes its range, or a robot that follows it.
         position: (3,) origin of the platform frame in the world frame, length; each coordinate fixed or free.
         rotation: orientation of the platform.
         tasks: tasks of the platform, one or more.
@@ -86,7 +88,7 @@ class Case(Whole, Shown):
     """
 
     model: Model
-    parameters: Mapping[str, Value | PerTask | Sequence[Value | PerTask]]
+    parameters: Mapping[str, Value | PerTask | PerPose | Sequence[Value | PerTask | PerPose]]
     position: Sequence[Value]
     tasks: Sequence[Task]
     rotation: Rotation = field(default_factory=Rotation)
@@ -133,6 +135,17 @@ class Case(Whole, Shown):
             CaseError: a value is not allowed.
         """
         store = object.__setattr__
+        resolved = with_settings_resolved(
+            self.model,
+            self.parameters,
+            self.limits,
+            self.workspace,
+            self.loading,
+            self.joint_centre_tolerance,
+            self.units,
+        )
+        for name, value in resolved._asdict().items():
+            store(self, name, value)
         checked = check_parameters(self.parameters, self.model, len(self.tasks), self.units)
         store(self, "parameters", MappingProxyType(checked))
         known = {} if self.dimensions_per_task else self.parameters
@@ -158,6 +171,7 @@ class Case(Whole, Shown):
         if self.workspace is not None:
             self.workspace.check(self.units)
             check_excursions(self.workspace, self.poses[0], self.pose_count, self.units)
+        check_pose_settings(self.model, self.workspace, len(self.changes), has_path=self.path is not None)
         if self.path is not None:
             self.path.check(self.units)
         if not 1 / LARGEST <= check_real(self.characteristic_length, "robot.characteristic_length") <= LARGEST:
@@ -239,6 +253,23 @@ class Case(Whole, Shown):
         }
         turn = None if self.path is None or self.path.tool is None else self.path.tool.turn
         return {**found, TURN: turn} if isinstance(turn, Free) else found
+
+    @property
+    def has_any_settings(self) -> bool:
+        """True if the workspace has settings of which any value may do at a pose, not a stated function of the pose."""
+        return self.workspace is not None and self.workspace.settings is PoseSettings.ANY
+
+    def refuse_settings(self, reason: str) -> None:
+        """Refuse settings that follow the pose.
+
+        Args:
+            reason: reason, as a clause for the message.
+
+        Raises:
+            CaseError: the case has such settings.
+        """
+        if self.model.settings:
+            raise CaseError("workspace.settings", f"is not supported here: {reason}", "affine", self.source)
 
     @property
     def changing_key(self) -> str:

@@ -11,6 +11,7 @@ from ...models import component_names
 from ..errors import CaseError, nearest
 from .names import name_of_task, parameter_name, pose_prefixes
 from .pathfile import TURN
+from .posesettings import override_setting
 
 #: New values by name, in the units of the case file: a number, or three for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
@@ -64,6 +65,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         _override_turn(tables["path"]["tool"], name, value)
         return
     _separate_tasks(tables, name)
+    if override_setting(tables, name, value):
+        return
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
     if end in (*ENDS, RATE) and whole in places:

@@ -107,6 +107,21 @@ class PerTask:
         return shared_value(self.values)
 
 
+@dataclass(frozen=True)
+class PerPose:
+    """Dimension that is set anew for every pose of the workspace, such as the base joints of a hexapod on slides.
+
+    Attributes:
+        range: range of the setting, or its catalogue values.
+        at: value in the middle of the workspace, for an affine setting; None for any value of the range.
+        slope: (3,) changes along x, y and z of the platform's position, for an affine setting; None for free slopes.
+    """
+
+    range: Free
+    at: Value | None = None
+    slope: Sequence[Value] | None = None
+
+
 def shared_value(values: Sequence[Value]) -> Value | None:
     """Return the values that several fixed or free values have in common; None without any."""
     first = values[0]
@@ -142,16 +157,41 @@ class StatedTasks(Protocol):
     tasks: list[Any]
 
 
-def internal_dimension(written: Any, units: Units, dimension: Dimension) -> Value | PerTask:  # noqa: ANN401 - a table
-    """Return the value of a dimension in a case file in internal units, or its value for each task."""
+def internal_dimension(
+    written: Any,  # noqa: ANN401 - a table
+    units: Units,
+    dimension: Dimension,
+) -> Value | PerTask | PerPose:
+    """Return the value of a dimension in a case file in internal units, or its values for each task or pose."""
     if isinstance(written, StatedTasks):
         return PerTask(tuple(internal_value(each, units, dimension) for each in written.tasks))
     value = internal_value(written, units, dimension)
+    if getattr(written, "per", None) == "pose" and isinstance(value, Free):
+        at, slope = getattr(written, "at", None), getattr(written, "slope", None)
+        along = _slope_dimension(dimension)
+        return PerPose(
+            value,
+            None if at is None else internal_value(at, units, dimension),
+            None if slope is None else tuple(internal_value(each, units, along) for each in slope),
+        )
     return PerTask((value,)) if getattr(written, "per", None) == "task" else value
 
 
-def written_dimension(value: Value | PerTask, units: Units, dimension: Dimension) -> TomlValue:
+def _slope_dimension(dimension: Dimension) -> Dimension:
+    """Return the dimension in which slopes of a setting are written: angles in the case's unit, per unit of length."""
+    return Dimension.ANGLE if dimension is Dimension.ANGLE else Dimension.NUMBER
+
+
+def written_dimension(value: Value | PerTask | PerPose, units: Units, dimension: Dimension) -> TomlValue:
     """Return the value of a dimension as TOML, the inverse of :func:`internal_dimension`."""
+    if isinstance(value, PerPose):
+        slope, along = value.slope, _slope_dimension(dimension)
+        stated = written_value(value.range, units, dimension)
+        policy = {
+            "at": None if value.at is None else written_value(value.at, units, dimension),
+            "slope": None if slope is None else [written_value(each, units, along) for each in slope],
+        }
+        return {**(stated if isinstance(stated, dict) else {}), "per": "pose", **policy}
     if not isinstance(value, PerTask):
         written = written_value(value, units, dimension)
         return {**written, "per": "path"} if isinstance(written, dict) and "rate" in written else written

@@ -24,6 +24,7 @@ from .limits.limits import Limits
 from .overrides import Settings, override_number
 from .pose import (
     OverPoses,
+    PerPose,
     PerTask,
     Pose,
     Rotation,
@@ -367,7 +368,7 @@ def _expectation(written: ExpectTable) -> Expectation:
 
 def _parameter_value(
     key: str, given: Dimensional | list[Dimensional], units: Units, dimension: Dimension
-) -> Value | PerTask | list[Value | PerTask]:
+) -> Value | PerTask | PerPose | list[Value | PerTask | PerPose]:
     """Return the value of a parameter, angles in radians.
 
     Args:

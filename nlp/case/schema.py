@@ -53,13 +53,23 @@ Per = Literal["task"]
 class DimensionRange(Range):
     """Range of a free dimension."""
 
-    per: Literal["task", "path"] | None = Field(
+    per: Literal["task", "path", "pose"] | None = Field(
         default=None,
-        description="task: the dimension is set anew for every task; path: it changes along the tool path; the same "
-        "value everywhere if left out",
+        description="task: the dimension is set anew for every task; path: it changes along the tool path; pose: it is "
+        "set for every pose of the workspace; the same value everywhere if left out",
     )
     rate: float | None = Field(
         default=None, description="largest change per second of a dimension with per = 'path'; inf for no limit"
+    )
+    at: Value | None = Field(
+        default=None,
+        description="value in the middle of the workspace, of a dimension with per = 'pose'; free within min and max if "
+        "left out",
+    )
+    slope: Annotated[list[Value], Field(min_length=3, max_length=3)] | None = Field(
+        default=None,
+        description="changes of a dimension with per = 'pose' along x, y and z of the position, per unit of length; free "
+        "if left out",
     )
 
     @model_validator(mode="after")
@@ -69,6 +79,11 @@ class DimensionRange(Range):
             raise fault_of("rate", MISSING_RATE)
         if self.per != "path" and self.rate is not None:
             raise fault_of("rate", 'has an effect only with per = "path"')
+        for key in ("at", "slope"):
+            if self.per != "pose" and getattr(self, key) is not None:
+                raise fault_of(key, 'has an effect only with per = "pose"')
+        if self.per == "pose" and self.start is not None:
+            raise fault_of("start", 'has no effect with per = "pose": give at = { min, max, start }')
         return self
 
 
@@ -78,8 +93,10 @@ class Listed(Table):
     values: Annotated[list[FiniteFloat], Field(min_length=1)] = Field(
         description="allowed values of the dimension, two or more"
     )
-    per: Per | None = Field(
-        default=None, description="task: a value is chosen for every task; one value for all tasks if left out"
+    per: Literal["task", "pose"] | None = Field(
+        default=None,
+        description="task: a value is chosen for every task; pose: for every pose of the workspace; one value if left "
+        "out",
     )
 
 

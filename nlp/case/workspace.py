@@ -35,6 +35,13 @@ class TurnKind(enum.Enum):
     ROLL_PITCH_YAW = "roll, pitch, yaw"
 
 
+class PoseSettings(enum.Enum):
+    """Rules for dimensions that are set anew for every pose of a workspace."""
+
+    AFFINE = "affine"
+    ANY = "any"
+
+
 @dataclass(frozen=True)
 class Turns:
     """Rotations of a workspace.
@@ -81,6 +88,9 @@ class Workspace:
             dependent coordinate is a limit; a number is the start of the search for its value.
         held: indices of independent coordinates with a fixed value; empty without dependent coordinates.
         position_set: set of positions; None for all positions of the box.
+        settings: rule for dimensions that are set anew for every pose. ``AFFINE``: affine functions of the position;
+            ``ANY``: any value of the range that satisfies the limits at the pose. None without such dimensions.
+        setting_names: names of these dimensions, which a case adds.
 
     Raises:
         CaseError: a coordinate is not allowed; the message names its key in a case file.
@@ -93,6 +103,8 @@ class Workspace:
     dependent: tuple[DependentCoordinate, ...] = ()
     held: tuple[int, ...] = ()
     position_set: PositionSet | None = None
+    settings: PoseSettings | None = None
+    setting_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.position) != 3:
@@ -245,6 +257,7 @@ class Workspace:
             if self.position_set is None
             else self.position_set.to_table(units),
             "rotation": None if turns == Turns() else rotation,
+            "settings": None if self.settings is None else self.settings.value,
         }
 
 

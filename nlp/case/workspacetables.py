@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_validator
@@ -14,7 +15,7 @@ from .pose import MISSING_RATE, internal_value
 from .positionsets import PositionSet
 from .positiontables import PositionSetTable, Span
 from .table import FileName, Range, Table, Value, Vector, fault_of, tag_of_number
-from .workspace import TURNS, TurnKind, Turns, Workspace
+from .workspace import TURNS, PoseSettings, TurnKind, Turns, Workspace
 
 
 class WorkspaceRotationTable(Table):
@@ -71,6 +72,12 @@ class WorkspaceTable(Table):
         default=None, description="rotations of the platform; if left out, no rotation"
     )
 
+    settings: Literal["affine", "any"] | None = Field(
+        default=None,
+        description="rule for dimensions with per = 'pose'; affine: an affine function of the position; any: some "
+        "value of the range at each pose, reset at a standstill",
+    )
+
     def read(self, units: Units, *, has_limits: bool) -> Workspace:
         """Return the workspace.
 
@@ -84,9 +91,11 @@ class WorkspaceTable(Table):
         turns, about_pose = _turns(self.rotation, units), self.about == "pose"
         if isinstance(self.position, PositionSetTable):
             positions: PositionSet = self.position.read(units)
-            return Workspace.within(positions, turns, has_limits, about_pose=about_pose)
-        position = [internal_value(value, units, Dimension.LENGTH) for value in self.position]
-        return Workspace(position, turns, has_limits, about_pose=about_pose)
+            found = Workspace.within(positions, turns, has_limits, about_pose=about_pose)
+        else:
+            position = [internal_value(value, units, Dimension.LENGTH) for value in self.position]
+            found = Workspace(position, turns, has_limits, about_pose=about_pose)
+        return found if self.settings is None else replace(found, settings=PoseSettings(self.settings))
 
 
 Six = Annotated[list[FiniteFloat], Field(min_length=6, max_length=6)]

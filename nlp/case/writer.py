@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import casadi as ca
 import numpy as np
 
-from ...models import Dimension, FloatArray, Model, Substitution, axis_from_screw, unit_vector
+from ...models import Dimension, FloatArray, Model, Parameter, Substitution, axis_from_screw, unit_vector
+from ...models.posesettings import slope_name
 from ...models.statics import driven_joints
 from ..errors import CaseError
 from ..units import Units
@@ -25,7 +26,8 @@ from .checks import check_real, check_reals
 from .displacements import written_displacements
 from .loads import Loading
 from .overrides import fields_of
-from .pose import Free, Pose, Rotation, written_dimension, written_value
+from .pose import Free, PerPose, PerTask, Pose, Rotation, Value, written_dimension, written_value
+from .posesettings import setting_limits, stated_setting
 from .reader import case_from_tables, case_with_settings
 from .settings import Expectation, Search
 from .task import Task, unit_twist
@@ -115,9 +117,11 @@ def _lines(case: Case) -> Iterator[str]:
         "[robot]", {"model": name, **options, "characteristic_length": length, **_stiffness(case.loading)}
     )
     parameters: dict[str, TomlValue] = {}
+    slopes = {slope_name(each.name) for each in model.settings}
     for item in model.parameters:
-        values, given = case.components(item.name), case.parameters[item.name]
-        stated = given if isinstance(given, Sequence) else [given]
+        if item.name in slopes:
+            continue
+        values, stated = case.components(item.name), _stated(case, item)
         numbers = [written_dimension(value, units, item.dimension) for value in stated]
         parameters[item.name] = numbers[0] if len(numbers) == 1 else numbers
         if item.is_direction and not any(isinstance(value, Free) for value in values):
@@ -146,6 +150,21 @@ def _lines(case: Case) -> Iterator[str]:
     for row in case.published:
         value = row.value[0] if len(row.value) == 1 else row.value
         yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
+
+
+def _stated(case: Case, item: Parameter) -> list[Value | PerTask | PerPose]:
+    """Return the components of a parameter as a case file states them."""
+    given = case.parameters[item.name]
+    found: list[Value | PerTask | PerPose] = list(given) if isinstance(given, Sequence) else [given]
+    affine = {each.name for each in case.model.settings}
+    names = affine if case.workspace is None else affine.union(case.workspace.setting_names)
+    for k, name in enumerate(item.components):
+        value = found[k]
+        if name in affine:
+            found[k] = stated_setting(case.model, name, case.components(item.name)[k], case.components(slope_name(name)))
+        elif name in names and isinstance(value, Free):
+            found[k] = PerPose(value)
+    return found
 
 
 def _units(units: Units) -> dict[str, TomlValue | None]:
@@ -269,7 +288,10 @@ def _limits(case: Case) -> dict[str, TomlValue | None]:
     found: dict[str, TomlValue | None] = {}
     if case.limits_over:
         found["over"] = case.limits_over
+    own = setting_limits(case.model)
     for limit in case.limits:
+        if limit.name in own:
+            continue
         _merge(found, limit.to_keys(case.model, case.units), "limits")
     return found
 

@@ -25,6 +25,7 @@ from ..words.designs import designs_summary as designs_summary
 from ..words.inverse import inverse_summary as inverse_summary
 from ..words.models import unknown_lines as unknown_lines
 from ..words.path import path_summary as path_summary
+from ..words.posesettings import pose_settings_summary as pose_settings_summary
 from ..words.summary import case_summary as case_summary
 from ..words.summary import case_tables as case_tables
 from ..words.summary import certified_summary as certified_summary

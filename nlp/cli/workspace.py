@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 from . import contents, options
 from .progress import spinner, tell_workspace
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from ..case.case import Case
+    from ..case.overrides import Settings
     from ..evidence.state import WorkspacePose
     from ..proof.workspace.judgement import Judgement
     from ..proof.workspace.proof_record import ProofRecord
@@ -59,6 +60,20 @@ def workspace(
     record = proof_record(proof, json_file)
     answer_after(Milestone.BOUND)
     (loaded, text, inputs), chosen = options.read_changed_case(case, settings, of)
+    if loaded.has_any_settings:
+        unsupported = {
+            "--scale": scale,
+            "--quantity": quantities,
+            "--leg-error": leg_error,
+            "--proof": proof,
+            "--plot": plot,
+            "--plot-pose": plot_pose,
+            "--html": html,
+        }
+        _refuse(unsupported)
+        files = options.Outputs(json=json_file, csv=csv_file)
+        files.check(inputs)
+        _existence(case, loaded, chosen, time, files, whole=whole)
     workspace_of_case(loaded)
     tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
@@ -88,6 +103,50 @@ def workspace(
         plot_pose=lambda: _worst(loaded, result, plot_pose),
         html=lambda: contents.workspace_page(contents.WorkspaceReport(loaded, text, result, slices, command)),
         proof=lambda: proof_text(proof, judged, record, text, quantities or (), leg_error),
+    )
+
+
+def _refuse(given: dict[str, object]) -> None:
+    """Refuse options of a workspace in which some setting must work at each pose.
+
+    Raises:
+        InputError: an option is given.
+    """
+    from ..errors import InputError
+
+    for option, value in given.items():
+        if value:
+            raise InputError(f'{option}: is not supported with settings = "any"; use settings = "affine"')
+
+
+def _existence(
+    name: str, case: Case, chosen: Settings, time: float | None, files: options.Outputs, *, whole: bool
+) -> NoReturn:
+    """Prove that settings exist at every pose, write the files, show the answer, and exit."""
+    from ..proof.workspace.judge import TIME_LIMIT
+    from ..proof.workspace.pose_settings import prove_settings
+    from ..results.posesettings import pose_settings_of
+    from ..words.poses import evaluate_command
+
+    with spinner("formulating") as show:
+        found = prove_settings(
+            case,
+            time_limit=TIME_LIMIT if time is None else time,
+            progress=lambda proved, left: show(f"settings: {proved} boxes proved, {left} left"),
+        )
+    result = pose_settings_of(found, chosen)
+    middle = {each.name: (each.lower + each.upper) / 2 for each in result.ranges}
+
+    def command(pose: WorkspacePose) -> str:
+        """Return the command that shows a pose with the settings in the middle of their ranges."""
+        return evaluate_command(name, case.replace(middle), {**chosen, **middle}, pose)
+
+    def summary() -> Iterator[Line | TextTable]:
+        """Return the verdict and the settings of each box."""
+        return contents.pose_settings_summary(case, result, command)
+
+    files.deliver(
+        summary, whole=whole, done=result.proved, json=lambda: result, csv=lambda: contents.tables_as_csv(summary())
     )
 
 

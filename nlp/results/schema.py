@@ -23,6 +23,7 @@ from .evaluation import EvaluationResult
 from .evidence import CertifiedResult
 from .explorations import FrontResult, SweepResult
 from .path import PathResult
+from .posesettings import PoseSettingsResult
 from .tradeoff import TradeoffResult
 from .workspace import WorkspaceResult
 
@@ -36,6 +37,7 @@ RESULTS: tuple[type[JsonObject], ...] = (
     TradeoffResult,
     WorkspaceResult,
     PathResult,
+    PoseSettingsResult,
     AxisRangesResult,
     ComparisonResult,
     FrontResult,
@@ -177,6 +179,7 @@ Result: TypeAlias = (
     | TradeoffResult
     | WorkspaceResult
     | PathResult
+    | PoseSettingsResult
     | AxisRangesResult
     | ComparisonResult
     | FrontResult

@@ -20,6 +20,7 @@ from .lines import engine_words
 from .motors import OUTCOME_WORDS, ends_of_motor, motor_tables
 from .numbers import number
 from .poses import pose_words
+from .posesettings import policy_lines
 from .text import Line, TextTable, Tone, in_part
 from .verdicts import (
     answer_words,
@@ -41,8 +42,9 @@ if TYPE_CHECKING:
 
 
 def _about_lines(case: Case, result: WorkspaceResult) -> Iterator[Line]:
-    """Yield the tolerance and the set of poses that a verdict covers; nothing for the exact robot and all poses."""
+    """Yield tolerance, affine settings and set of poses that a verdict covers, each where the case has it."""
     yield from tolerance_lines(case, result.joint_centre)
+    yield from policy_lines(case)
     if result.poses is not None:
         yield Line(result.poses, label="poses")
 

@@ -102,6 +102,11 @@ def quantity_named(name: str, model: Model) -> Quantity | None:
     return next((quantity for quantity in model.quantities if quantity.name == name), None)
 
 
+def value_of(quantity: str, owner: str) -> str:
+    """Return the name of one value of a quantity: with the limb or joint that owns it, if any does."""
+    return f"{quantity} limb {owner}" if owner else quantity
+
+
 @dataclass(frozen=True)
 class QuantityLimit(IntervalLimit):
     """Smallest and largest value of a quantity that the robot defines, for every limb and every pose.
@@ -152,5 +157,5 @@ class QuantityLimit(IntervalLimit):
         for quantity, values in zip(pose.model.quantities, pose.robot.quantities, strict=True):
             if quantity.name == self.measure:
                 for i, owner in enumerate(quantity.owners):
-                    name, reading = f"{quantity.name} limb {owner}{pose.where}", Reading(quantity.dimension)
+                    name, reading = value_of(quantity.name, owner) + pose.where, Reading(quantity.dimension)
                     yield between(name, values[i], reading, quantity.name, lower=self.min, upper=self.max)

@@ -17,6 +17,7 @@ from ...case.case import Case
 from ...case.limits.clearance import LegClearance
 from ...case.limits.constraint import LENGTH, NOT_NEGATIVE, NUMBER, SQUARED_LENGTH, Reading
 from ...case.limits.forces import ActuatorForce, ActuatorPower, ActuatorSpeed
+from ...case.limits.interval import value_of
 from ...case.limits.legs import Actuator, LegLength
 from ...case.limits.singular_values import ConditionNumber, SmallestSingularValue
 from ...case.motors import Motor
@@ -246,7 +247,7 @@ def _of_quantities(layout: Layout, names: Sequence[str]) -> Iterator[Claim]:
         quantity, values = layout.case.model.quantities[known[name]], layout.robots[0].quantities[known[name]]
         for i, owner in enumerate(quantity.owners):
             for sense in (Sense.MIN, Sense.MAX):
-                yield Claim(f"{name} limb {owner}", sense, values[i], Reading(quantity.dimension))
+                yield Claim(value_of(name, owner), sense, values[i], Reading(quantity.dimension))
 
 
 def _of_tasks(layout: Layout) -> Iterator[Claim]:

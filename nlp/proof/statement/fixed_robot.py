@@ -82,7 +82,9 @@ def check_leg_error(case: Case, leg_error: float) -> None:
 
 
 def has_straight_legs(model: Model) -> bool:
-    """Return whether a robot that is given by its rows consists of six straight legs."""
+    """Return whether a robot that is given by its rows consists of six straight legs between fixed joint centres."""
+    if model.settings:
+        return False
     return len(model.legs) == LEGS == len(model.wrenches) and not (model.members or model.unknowns or model.structure)
 
 

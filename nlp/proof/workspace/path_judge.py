@@ -83,6 +83,7 @@ def judge_path(
     """
     cover, box, workspace = covered(path, robot_length(case))
     case = replace(case, workspace=workspace)
+    case.refuse_settings("along a path, settings that move change the speeds of the actuators")
     case.fixed_parameters("a path is judged with fixed dimensions")
     check_determined_joints(case.model, "path", case.source)
     if not path.is_timed:
