@@ -56,6 +56,7 @@ SOLVED = (
     "pick-and-place",
     "motion-base",
     "agile-eye",
+    "fixture-pins",
 )
 SLICED = ("hexapod-linuxcnc", "reachy-mini-envelope")
 

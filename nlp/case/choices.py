@@ -100,6 +100,17 @@ def within_ranges(case: Case, numbers: Sequence[CatalogueDimension], ranges: Ran
     for number, (first, behind) in zip(numbers, ranges, strict=True):
         low, high = number.values[first], number.values[behind - 1]
         given[number.parameter, number.component, number.task] = low if behind - first == 1 else Free(low, high)
+    return with_values(case, given)
+
+
+def with_values(case: Case, given: Mapping[tuple[str, int, int | None], Value]) -> Case:
+    """Return a case with other values of some components of its parameters.
+
+    Args:
+        case: the case.
+        given: value by parameter, index of the component, and index of the task, which is None for a value of all
+            tasks.
+    """
 
     def within(item: Parameter, k: int) -> Value | PerTask:
         values = [

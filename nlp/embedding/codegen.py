@@ -19,7 +19,7 @@ from .. import __version__
 from ..case.case import Case
 from ..case.task import Sense
 from ..errors import InputError
-from ..program.formulation import formulate
+from ..program.formulation import formulate_whole
 from ..program.nlp import Nlp
 from ..program.sampling import starting_points
 from ..system.markdown import markdown_text
@@ -145,7 +145,7 @@ def size_words(case: Case, files: Mapping[str, str]) -> str:
     words = f"{size / 1000:.0f} kB of C"
     if size <= _LARGE:
         return words
-    program = formulate(case).program
+    program = formulate_whole(case).program
     operations: dict[str, int] = {}
     for place in find_loops(program).plain:
         constraint = program.constraints[place]
@@ -217,6 +217,7 @@ def _substitutions(subject: Subject, staged: StagedFunctions, columns: NumberCol
         "m": str(len(program.model.frame_rows)),
         "nc": str(len(program.constraints)),
         "ntasks": str(len(case.tasks)),
+        "nposetasks": str(program.robot.F.numel()),
         "nweights": str(len(program.places.weights)),
         "nposes": str(poses),
         "nlegs": str(len(program.robot.legs)),

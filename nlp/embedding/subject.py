@@ -15,7 +15,7 @@ from ..case.case import Case
 from ..case.pose import OverPoses
 from ..case.task import Method, Sense
 from ..errors import CaseError
-from ..program.formulation import formulate, formulate_weighted, scaled_weights
+from ..program.formulation import formulate, formulate_weighted, formulate_whole, scaled_weights
 from ..program.nlp import Nlp
 from ..program.pairs import with_all_pairs
 from ..proof.statement.standard_form import is_in_home_mode
@@ -55,7 +55,7 @@ def find_subject(case: Case) -> Subject:
         fault = "is not supported in C: minimise F, and limit forces, speeds and powers instead"
         raise CaseError("objective.minimise", fault, case.tasks[0].measure, case.source)
     _refuse_nested_loops(case)
-    _check_pairs(formulate(case))
+    _check_pairs(formulate_whole(case))
     if len(case.tasks) == 1 or case.method is Method.WEIGHTED_SUM:
         several = len(case.tasks) > 1
         nlp = formulate_weighted(case, scaled_weights(case)) if several else formulate(case)
@@ -84,18 +84,20 @@ def _refuse_nested_loops(case: Case) -> None:
 def magnitude_of(nlp: Nlp) -> SX:
     """Return the objective (1, 1) with the magnitudes of its terms: an upper bound on its absolute value.
 
-    For several poses, the value is an estimate from the first pose.
+    For several poses, the value is an estimate from the first pose of each task.
     """
     case, places = nlp.case, nlp.program.places
     size = nlp.program.robot.magnitude
+    if case.changes:
+        size = ca.vertcat(*[robot.magnitude for robot in nlp.program.robots[:: case.poses_per_task]])
     if places.weights:
         weights = ca.fabs(nlp.program.p[list(places.weights)])
         if places.epigraph is None:
             size = ca.dot(weights, size)
         else:
             size = size / weights if {task.sense for task in case.tasks} == {Sense.MAX} else size * weights
-    if case.over_poses is OverPoses.SUM and case.pose_count > 1:
-        size = size * case.pose_count
+    if case.over_poses is OverPoses.SUM:
+        size = size * case.poses_per_task
     return ca.mmax(size)
 
 
@@ -129,7 +131,7 @@ def _rounded(nlp: Nlp) -> Nlp:
 
 def objective_words(nlp: Nlp) -> str:
     """Return the objective of a program in words."""
-    case, poses = nlp.case, nlp.case.pose_count
+    case, poses = nlp.case, nlp.case.poses_per_task
     over = f" over {poses} poses" if poses > 1 else ""
     if nlp.program.places.weights:
         if case.method is Method.WEIGHTED_SUM:

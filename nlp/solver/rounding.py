@@ -19,10 +19,17 @@ import numpy as np
 
 from ...models import Dimension
 from ..case.case import Case
-from ..case.choices import ChosenDimension, catalogue_dimensions, within_ranges
+from ..case.choices import (
+    ChosenDimension,
+    catalogue_dimensions,
+    values_of_component,
+    with_values,
+    within_ranges,
+)
 from ..case.pose import Free, Value
 from ..case.task import Method
 from ..errors import InputError
+from ..evidence.state import RobotState
 from .choices import cost_of, solve_choices
 from .solution import Rounding, Solution
 from .solve import solve
@@ -39,7 +46,10 @@ _STEPS = 1e12
 
 
 class _Place(NamedTuple):
-    """A dimension to round: parameter, component, name, dimension, bounds, and value at the solution."""
+    """A dimension to round: parameter, component, name, dimension, bounds, value at the solution, and index of its task.
+
+    The task is None for a dimension that is the same for all tasks.
+    """
 
     parameter: str
     component: int
@@ -47,6 +57,7 @@ class _Place(NamedTuple):
     dimension: Dimension
     bounds: Free
     value: float
+    task: int | None
 
 
 def round_design(
@@ -87,20 +98,19 @@ def round_design(
     solve_fixed = partial(solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled)
     found, farther = solution, 0
     for farther in range(_FARTHEST + 1):
-        listed = {(each.parameter, each.component): _multiples(each, step, farther, case, option) for each in places}
-        parameters = {
-            item.name: [listed.get((item.name, k), value) for k, value in enumerate(chosen.components(item.name))]
-            for item in case.model.parameters
+        listed = {
+            (each.parameter, each.component, each.task): _multiples(each, step, farther, case, option)
+            for each in places
         }
-        near = replace(chosen, parameters=parameters)
+        near = with_values(chosen, listed)
         found = solve_choices(near, solve_fixed, _MOST) if catalogue_dimensions(near) else solve_fixed(near)
         if found.status.is_answer or found.status is Status.INTERRUPTED:
             break
-    state = found.outcomes[0].state
+    states = [outcome.state for outcome in found.outcomes]
     numbers = tuple(
         ChosenDimension(
             name=each.name,
-            value=math.nan if state is None else float(np.ravel(state.parameters[each.parameter])[each.component]),
+            value=_value(states[each.task or 0], each.parameter, each.component, math.nan),
             unit=case.units.label(each.dimension),
             values=None,
             before=each.value,
@@ -109,7 +119,7 @@ def round_design(
         for each in places
     )
     rounding = Rounding(step, cost_of(solution), cost_of(found), farther, numbers, found.choice)
-    return replace(found, case=case, choice=solution.choice, rounding=rounding)
+    return replace(found, case=case, choice=solution.choice, rounding=rounding, changes=solution.changes)
 
 
 def check_rounding(case: Case, step: float) -> None:
@@ -117,9 +127,6 @@ def check_rounding(case: Case, step: float) -> None:
     option = f"--round {step:g}"
     if not 0 < step < math.inf:
         raise InputError(f"{option}: must be positive and finite")
-    if case.dimensions_per_task:
-        fault = f"rounds one robot, but {case.changes[0]} changes from task to task"
-        raise InputError(f"{option}: {fault}; list its values with values = [...] instead")
     if len(case.tasks) > 1 and case.method is Method.AVERAGE:
         raise InputError(
             f"{option}: combine.method must be weighted-sum or worst-case: an average has no best rounding"
@@ -128,7 +135,8 @@ def check_rounding(case: Case, step: float) -> None:
         (item.dimension, value)
         for item in case.model.parameters
         if not item.is_direction
-        for value in case.components(item.name)
+        for k in range(len(item.components))
+        for _, _, value in values_of_component(case, item, k)
     ]
     if not any(_is_rounded(dimension, value) for dimension, value in values):
         raise InputError(f"{option}: the case has no free length or angle of the robot to round")
@@ -141,12 +149,17 @@ def _is_rounded(dimension: Dimension, value: Value) -> bool:
 
 def _places(case: Case, solution: Solution) -> Iterator[_Place]:
     """Yield the dimensions to round, with their values at a solution."""
-    state = solution.outcomes[0].state
     for item in case.model.parameters:
-        for k, value in enumerate(case.components(item.name)):
-            if not item.is_direction and _is_rounded(item.dimension, value) and isinstance(value, Free):
-                at = value.first if state is None else float(np.ravel(state.parameters[item.name])[k])
-                yield _Place(item.name, k, case.component_names(item)[k], item.dimension, value, at)
+        for k in range(len(item.components)):
+            for task, name, value in values_of_component(case, item, k):
+                if not item.is_direction and _is_rounded(item.dimension, value) and isinstance(value, Free):
+                    at = _value(solution.outcomes[task or 0].state, item.name, k, value.first)
+                    yield _Place(item.name, k, name, item.dimension, value, at, task)
+
+
+def _value(state: RobotState | None, parameter: str, component: int, otherwise: float) -> float:
+    """Return the value of a component of a parameter in a state of the robot; another value without a state."""
+    return otherwise if state is None else float(np.ravel(state.parameters[parameter])[component])
 
 
 def _multiples(place: _Place, step: float, farther: int, case: Case, option: str) -> Value:

@@ -437,10 +437,11 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
         yield optimality_line(combined.optimality)
 
 
-def change_lines(combined: CombinedData) -> Iterator[Line]:
-    """Yield the gain by each dimension or pose that changes from task to task."""
-    for change in combined.changes or ():
-        yield Line(_gain_words(change, combined), label=f"{change.name} per task")
+def change_lines(result: CombinedResult) -> Iterator[Line]:
+    """Yield the gain by each dimension or pose that changes from task to task; both answers are those before rounding."""
+    for change in result.combined.changes or ():
+        words = _gain_words(change, result.combined) + (", before rounding" if result.rounding is not None else "")
+        yield Line(words, label=f"{change.name} per task")
 
 
 def _gain_words(change: ChangeData, combined: CombinedData) -> str:

@@ -162,7 +162,7 @@ def _combined_summary(case: Case, result: CombinedResult) -> Summary:
         yield caution
     yield from _proof_lines(case, result)
     yield from combined_value_lines(combined)
-    yield from change_lines(combined)
+    yield from change_lines(result)
     for task in result.tasks:
         name = task.robot.task.name if task.robot is not None and task.robot.task is not None else None
         yield from _named(certificate_lines(task.certificate), name)
@@ -227,9 +227,9 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         tone = Tone.HOLDS if kept == len(result.limits) else Tone.FAULT
         yield Line(f"{kept} of {len(result.limits)} satisfied", label="limits", tone=tone, after=where)
     settings = result.settings or (robot,)
-    for each in settings:
-        name = each.task.name if each.task is not None and result.settings else None
-        yield from _named(singularity_lines(each, case.units), name)
+    for own in settings:
+        name = own.task.name if own.task is not None and result.settings else None
+        yield from _named(singularity_lines(own, case.units), name)
     yield from _remark_lines(case)
     yield from in_part("design", [design_table(case, robot, settings=result.settings or ())])
     limits = [limit_table(result.limits, size_of_F(robot), limits_title(case))] if result.limits else []
@@ -237,10 +237,10 @@ def evaluation_summary(case: Case, result: EvaluationResult) -> Summary:
         yield from _evaluated_robot(case, robot, result.principal_motions, limits)
         return
     yield from in_part("limits", limits)
-    for k, (each, task) in enumerate(zip(settings, result.tasks, strict=True)):
+    for k, (own, task) in enumerate(zip(settings, result.tasks, strict=True)):
         if task.principal_motions is not None:
-            parts = _evaluated_robot(case.of_task(k), each, task.principal_motions)
-            yield from (_of_task(item, k, each) for item in parts)
+            parts = _evaluated_robot(case.of_task(k), own, task.principal_motions)
+            yield from (_of_task(item, k, own) for item in parts)
 
 
 def _of_task(item: Line | TextTable, task: int, robot: RobotData) -> Line | TextTable:

@@ -583,35 +583,6 @@ def test_refusals(text: str, message: str) -> None:
     assert str(refused.value) == f"case.toml: {message}"
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ("evaluate",),
-        ("sweep", "--over", "x2=5:6:3"),
-        ("tradeoff", "--over", "x2=5:7:3"),
-        ("codegen", "--out", "x"),
-        ("pareto", "--goal", "max F:push", "--goal", "max F:turn"),
-        ("compare", "case", "stewart-gough"),
-    ],
-)
-def test_commands_for_one_robot_refuse_it(command: tuple[str, ...], tmp_path: Path, cli: Run) -> None:
-    file = tmp_path / "pins.toml"
-    file.write_text(PINS)
-    status, _, fault = cli(command[0], str(file), *command[1:])
-    assert status == 2
-    assert "robot.parameters.x1: changes from task to task, but this command takes one robot and pose" in fault
-
-
-def test_results_with_settings_give_no_single_robot(tmp_path: Path, cli: Run) -> None:
-    file, data = tmp_path / "pins.toml", tmp_path / "result.json"
-    file.write_text(PINS)
-    output_of(cli("solve", str(file), "--json", str(data)))
-    status, _, fault = cli("solve", str(file), "--of", str(data))
-    assert (status, "dimensions or the pose change from task to task" in fault) == (2, True)
-    status, _, fault = cli("solve", str(file), "--round", "0.5")
-    assert (status, "rounds one robot, but x1 changes from task to task" in fault) == (2, True)
-
-
 def test_cases_in_python_are_checked_too() -> None:
     case = pins()
     with pytest.raises(CaseError, match=r"x1.tasks: must have one value for each of the 2 tasks, got 3"):

@@ -279,7 +279,7 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
         parts += [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
     if combined.tasks:
         parts.append(html_table(outcome_table(combined, result.tasks), "F of each task", id="outcomes"))
-    parts.append(paragraphs(change_lines(combined)))
+    parts.append(paragraphs(change_lines(result)))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
     for k, own in enumerate(result.tasks):
