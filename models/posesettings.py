@@ -57,7 +57,7 @@ def with_pose_settings(model: Model, settings: Sequence[PoseSetting]) -> Model:
         slopes.append(Parameter(slope_name(each.name), slope, dimension, about, (0.0, 0.0, 0.0)))
         values.append(given[k] + ca.dot(slope, own.position - SX(list(each.centre))))
         about = f"value of {each.name} at the pose"
-        shown.append(Quantity(value_name(each.name), ("",), values[-1], item.dimension, about))
+        shown.append(Quantity(value_name(each.name), (each.name,), values[-1], item.dimension, about))
     for each, value in zip(settings, values, strict=True):
         given[places.index(each.name)] = value
     parts = (
