@@ -7,7 +7,7 @@ from ...models import Dimension
 from ..case.pose import Free, ends_of
 from ..evidence.state import WorkspacePose
 from ..proof.workspace.verdict import Outcome
-from ..system.jsonvalues import Absent, Inline, JsonObject
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
 from .verdicts import pose_data
@@ -43,7 +43,7 @@ class SettingBoxData(JsonObject):
         values: value of each setting, by name.
     """
 
-    coordinates: Mapping[str, tuple[float, float]]
+    coordinates: Mapping[str, Vector]
     values: Mapping[str, float]
 
 

@@ -123,8 +123,13 @@ class _Existence:
         self._workspace = case.world_workspace or first
         self._fixed = frozenset(each.index for each in first.dependent)
         closed = closed_form(case.model)
-        self._samples = None if closed.model.unknowns or first.dependent else _Samples(case, closed, self._workspace)
+        self._samples = None if closed.model.unknowns or first.dependent else self._sampled(closed)
         self._closed = closed
+
+    def _sampled(self, closed: ClosedForm) -> _Samples:
+        """Return the violations as functions of settings and pose; catalogue values are points of their range."""
+        ranges = [Free(each.lower, each.upper) for each in self._ranges]
+        return _Samples(_with_values(self._case, self._names, ranges), closed, self._workspace)
 
     def run(self, progress: Callable[[int, int], None] | None) -> SettingsProof:
         """Return the verdict; the box with the worst sample comes first, so that a refuting pose is found early."""
