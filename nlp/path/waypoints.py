@@ -92,7 +92,10 @@ def _sizes(path: ProgrammedPath) -> FloatArray:
 def _feeds(path: ProgrammedPath, points: Points) -> FloatArray:
     """Return the unit vectors (N, 3) of the feed at points; 0 without a translation."""
     timed = _timed(path)
-    back = Points(np.maximum(points.segments - (points.parameters == 0), 0), np.where(points.parameters == 0, 1.0, points.parameters))
+    back = Points(
+        np.maximum(points.segments - (points.parameters == 0), 0),
+        np.where(points.parameters == 0, 1.0, points.parameters),
+    )
     found = _units(twists_at(timed, points)[:, 3:]), _units(twists_at(timed, back)[:, 3:])
     first, last = found[0].copy(), found[1].copy()
     last[0] = first[0] if points.parameters[0] == 0 else last[0]

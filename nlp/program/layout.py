@@ -153,6 +153,12 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         raise CaseError(
             key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
         )
+    if case.over_path is not None:
+        name = next(iter(case.settings), None)
+        fault = "optimises along the path, but this command takes one pose; use solve"
+        if name is not None:
+            fault = f"{name} changes along the path, but this command takes one robot; use solve, or fix it with --set {name}"
+        raise CaseError("objective.as", fault, case.over_path.value, source=case.source)
     table, model = SymbolTable(), case.model
     owners = _Owners(table)
     parameters = [_add_parameter(case, item, owners) for item in model.parameters]

@@ -9,12 +9,16 @@ searches stop at the ridge where they begin.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ....models import FloatArray
 from .problem import ScheduleProblem, ends
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 #: Largest number of points of the dynamic programme; between them, settings are linear.
 _STAGES = 200
@@ -37,10 +41,10 @@ class Grid(NamedTuple):
         weights: (S,) weights of the points.
     """
 
-    stages: FloatArray
+    stages: NDArray[np.intp]
     values: FloatArray
     objective: FloatArray
-    reach: FloatArray
+    reach: NDArray[np.intp]
     weights: FloatArray
 
 
@@ -61,24 +65,24 @@ def grid_of(problem: ScheduleProblem, d: FloatArray, held: FloatArray, k: int, f
     s = np.repeat(held[stages][:, None, :], size, axis=1)
     s[:, :, k] = values
     which = np.repeat(stages, size)
-    found = problem.at(d, s.reshape(len(which), -1), which)
+    found = problem.at(d, s.reshape(len(which), -1), which.tolist())
     objective = problem.combined(found.objective).reshape(len(stages), size)
     objective = np.where(_allowed(found.excess.reshape(len(stages), size, -1)), objective, _OUT)
-    steps = np.array([problem.steps[a:b, k].sum() for a, b in zip(stages[:-1], stages[1:], strict=True)])
+    steps = np.array([problem.steps[a:b, k].sum() for a, b in pairwise(stages.tolist())])
     h = values[1] - values[0]
     reach = np.minimum(np.floor(steps / h), size).astype(int)
     weights = _stage_weights(problem.points.weights, stages, count)
     return Grid(stages, values, np.where(np.isfinite(objective), objective, _OUT), reach, weights)
 
 
-def _stages(problem: ScheduleProblem, k: int, most: int) -> tuple[FloatArray, int]:
+def _stages(problem: ScheduleProblem, k: int, most: int) -> tuple[NDArray[np.intp], int]:
     """Return the points (S,) of the dynamic programme, and the number of grid values that its rate needs."""
     count, setting = len(problem.points), problem.settings[k]
     span = setting.upper - setting.lower
     stride = max(math.ceil((count - 1) / (most - 1)), 1)
     while True:
         stages = np.unique(np.append(np.arange(0, count, stride), count - 1))
-        steps = np.array([problem.steps[a:b, k].sum() for a, b in zip(stages[:-1], stages[1:], strict=True)])
+        steps = np.array([problem.steps[a:b, k].sum() for a, b in pairwise(stages.tolist())])
         typical = float(np.median(steps))
         size = _GRID if typical >= span else math.ceil(_STEPS * span / typical) + 1
         if size <= _FINEST or len(stages) == 2:
@@ -86,7 +90,7 @@ def _stages(problem: ScheduleProblem, k: int, most: int) -> tuple[FloatArray, in
         stride *= 2
 
 
-def _stage_weights(weights: FloatArray, stages: FloatArray, count: int) -> FloatArray:
+def _stage_weights(weights: FloatArray, stages: NDArray[np.intp], count: int) -> FloatArray:
     """Return the sums (S,) of the weights of the points nearest to each stage."""
     nearest = np.searchsorted(0.5 * (stages[1:] + stages[:-1]), np.arange(count))
     return np.bincount(nearest, weights=weights, minlength=len(stages))
@@ -201,6 +205,23 @@ def _periodic(problem: ScheduleProblem, grid: Grid) -> FloatArray | None:
     return best
 
 
-def first_values(problem: ScheduleProblem) -> FloatArray:
-    """Return the first values (k,) of the settings."""
-    return ends(problem.settings)[2]
+def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, most: int = 3) -> list[FloatArray]:
+    """Return constant settings (k,) at which a search for the best constant begins: those of a grid, best first.
+
+    Args:
+        problem: the problem.
+        d: (n,) design.
+        fine: If false, a coarser grid.
+        most: largest number of constants.
+    """
+    low, high, first = ends(problem.settings)
+    if len(first) != 1:
+        return [first, 0.5 * (low + high)] if len(first) else [first]
+    held = np.repeat(first[None], len(problem.points), axis=0)
+    grid = grid_of(problem, d, held, 0, fine)
+    means = grid.objective.min(axis=0) if problem.is_worst else grid.weights @ grid.objective
+    means = np.where(np.isfinite(grid.objective).all(axis=0), means, _OUT)
+    left, right = np.append(_OUT, means[:-1]), np.append(means[1:], _OUT)
+    peaks = np.flatnonzero((means >= left) & (means >= right) & np.isfinite(means))
+    best = peaks[np.argsort(-means[peaks], kind="stable")][:most]
+    return [np.array([grid.values[m]]) for m in best.tolist()] or [first]

@@ -56,7 +56,9 @@ def polish(
         if level is None or constant:
             return level
         least = level.value - _LOSS * abs(level.value)
-        again = _search(problem, level.d, level.s, constant=False, near=True, iterations=iterations, goal="", at_least=least)
+        again = _search(
+            problem, level.d, level.s, constant=False, near=True, iterations=iterations, goal="", at_least=least
+        )
         return level if again is None or again.value < least - _LOSS * abs(level.value) else again
     return _search(problem, d, s, constant=constant, near=near, iterations=iterations, goal="")
 

@@ -192,7 +192,9 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     closed = closed_form(case.model)
     model = closed.model
     if model.unknowns:
-        fault = f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
+        fault = (
+            f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
+        )
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     design, settings, parameters, d, s = _variables(case)
     point = SX.sym("point", _POINT)
