@@ -1,4 +1,4 @@
-"""Settings for every pose of a workspace, against kinematics written here: affine settings, and existence of settings."""
+"""Settings for every pose of a workspace, against kinematics written here: affine, and existence."""
 
 import json
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ def judged(x1: object, half: float, settings: str | None) -> Judgement:
 
 
 def lengths(x1: Array, p: Array) -> Array:
-    """Lengths (P, 6) of the legs: two joints at each corner of the base, which go to the two nearest platform joints."""
+    """Lengths (P, 6) of the legs: each corner of the base has two joints, for the two nearest platform joints."""
     ends = []
     for k in range(3):
         base = np.radians(120 * k)
@@ -165,7 +165,7 @@ def test_a_stopped_search_says_so() -> None:
 def test_a_solve_finds_value_and_slope() -> None:
     solution = solve(load_case(NAME), starts=4)
     assert solution.status.is_answer
-    assert solution.F == pytest.approx(2.990456, rel=1e-6)
+    assert pytest.approx(2.990456, rel=1e-6) == solution.F
     x1, slope = solution.parameters["x1"], solution.parameters["x1_slope"][2]
     p = positions(4.2)
     found = x1 + slope * (p[:, 2] - 20)
@@ -253,7 +253,12 @@ POSE: dict[str, object] = {"min": 20, "max": 32, "per": "pose"}
         (POSE, "affine", {"tolerance": {"joint_centre": 0.01}}, "tolerance.joint_centre: is not supported"),
         (POSE, "affine", {"limits": {"footprint": {"base": 30}}}, "limits.footprint: is not supported"),
         (POSE, "affine", {"limits": {"actuator_speed": {"max": 3}}}, "limits.actuator_speed: is not supported"),
-        (POSE, "any", {"limits": {"over": "workspace", "leg_length": {"max": 34}}}, "must be 'affine' with limits over"),
+        (
+            POSE,
+            "any",
+            {"limits": {"over": "workspace", "leg_length": {"max": 34}}},
+            "must be 'affine' with limits over",
+        ),
     ],
 )
 def test_bad_settings_are_refused(x1: object, settings: str | None, tables: dict[str, Any], words: str) -> None:
