@@ -17,7 +17,6 @@ from ...models.posesettings import can_follow_pose, slope_name, value_name, with
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
-from .limits.interval import QuantityLimit
 from .limits.limits import Limits
 from .loads import Loading
 from .pose import Free, PerPose, PerTask, Value, ends_of
@@ -120,6 +119,8 @@ def _affine(
     Raises:
         CaseError: settings of this robot cannot be affine, or have catalogue values.
     """
+    from .limits.interval import QuantityLimit  # noqa: PLC0415 - most cases start without the tables of limits
+
     if workspace.about_pose:
         raise CaseError("workspace.about", "must be 'world' with settings = 'affine'", "pose")
     for each in found:
