@@ -1,12 +1,12 @@
 """C of the next step along a tool path: tables of the value of each setting with all further points, and the schedule.
 
-A controller that takes the best reachable setting at each point runs into limits later. The tables look ahead: the value
-of a setting at a point counts this point and the best continuation,
+A controller that takes the best reachable setting at each point may run into limits later. The tables look ahead: the
+value of a setting at a point counts this point and the best continuation,
 
     V_i(m) = f_i(m) + max { V_(i+1)(m') : |m' - m| <= w_i }
 
 with ``min`` in place of ``+`` for the worst point. A disturbed controller takes the reachable setting with the largest
-value, and so stays on a schedule that keeps all limits, if there is one.
+value. Settings of the table keep all limits at the points; values between them are interpolated.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class StepTables(NamedTuple):
 
     Attributes:
         values: (M,) values of the setting.
-        ahead: (N, M) value of each setting at each point with its best continuation; minus infinity if each continuation
-            violates a limit.
+        ahead: (N, M) value of each setting at each point with its best continuation; minus infinity if each
+            continuation violates a limit.
         schedule: (N,) the best schedule of grid values.
         mean: objective of this schedule.
     """

@@ -94,7 +94,7 @@ def greedy_end(problem: ScheduleProblem, start: float) -> int:
 
 
 @needs_compiler
-def test_steps_with_a_look_ahead_keep_the_limits_where_greedy_steps_fail(problem: ScheduleProblem, steps: Steps) -> None:
+def test_a_look_ahead_keeps_the_limits_where_greedy_steps_fail(problem: ScheduleProblem, steps: Steps) -> None:
     (setting,) = problem.settings
     code, start = steps.best(0, setting.lower, setting.upper)
     s, faults = steps.followed(problem, 0, start)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: Number of cells at the beginning, and largest number of halvings.
 _CELLS, _LEVELS = 64, 24
 #: Largest number of cells of all points together, and number of cells that are enclosed at a time.
-_MOST, _BATCH = 3_000_000, 20_000
+_MOST, _BATCH = 600_000, 20_000
 #: Relative rounding of a sum of the terms of a form: far above the number of terms times 2^-53.
 _ROUNDING = 2.0**-44
 #: Relative increase of the number of cells that a rate allows, for its rounding; and rounding of the ends of cells, as a
@@ -222,8 +222,7 @@ def _up(values: FloatArray) -> FloatArray:
     return np.asarray(np.nextafter(values, math.inf))
 
 
-def _largest_within(
-    index: NDArray[np.intp], values: FloatArray, at: NDArray[np.intp], reach: int) -> FloatArray:
+def _largest_within(index: NDArray[np.intp], values: FloatArray, at: NDArray[np.intp], reach: int) -> FloatArray:
     """Return the largest value of the cells within some steps of each cell; minus infinity without any.
 
     Args:
