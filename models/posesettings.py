@@ -1,8 +1,8 @@
 """Settings of a robot that are affine functions of the platform's position: ``s = s0 + k . (p - c)``.
 
 A dimension that a slow drive resets for every pose, such as the radius of base joints on slides, follows a policy. Its
-expression replaces the dimension in all parts of the model, so that everything that reads a model also reads the policy.
-The model then describes the robot at a standstill: work rates and forces are those with locked settings.
+expression replaces the dimension in all parts of the model, so that each reader of the model also reads the policy. The
+model then describes the robot at a standstill: work rates and forces are those with locked settings.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from .instance import Substitution
 from .model import Model
 from .parts import Dimension, Parameter, PoseSetting, Quantity
 from .whole import expressions_of, with_expressions
+
 
 def slope_name(setting: str) -> str:
     """Return the name of the parameter with the slopes of a setting, by the name of the setting."""
@@ -57,7 +58,7 @@ def with_pose_settings(model: Model, settings: Sequence[PoseSetting]) -> Model:
         slopes.append(Parameter(slope_name(each.name), slope, dimension, about, (0.0, 0.0, 0.0)))
         values.append(given[k] + ca.dot(slope, own.position - SX(list(each.centre))))
         about = f"value of {each.name} at the pose"
-        shown.append(Quantity(value_name(each.name), ("",), values[-1], item.dimension, about))
+        shown.append(Quantity(value_name(each.name), (each.name,), values[-1], item.dimension, about))
     for each, value in zip(settings, values, strict=True):
         given[places.index(each.name)] = value
     parts = (

@@ -146,7 +146,7 @@ class Case(Whole, Shown):
         )
         for name, value in resolved._asdict().items():
             store(self, name, value)
-        checked = check_parameters(self.parameters, self.model, len(self.tasks), self.units)
+        checked = check_parameters(resolved.parameters, self.model, len(self.tasks), self.units)
         store(self, "parameters", MappingProxyType(checked))
         known = {} if self.dimensions_per_task else self.parameters
         if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
@@ -224,7 +224,7 @@ class Case(Whole, Shown):
 
     def _stated(self, name: str) -> tuple[Value | PerTask, ...]:
         """Return the components of a parameter as the case states them."""
-        values = self.parameters[name]
+        values: Any = self.parameters[name]  # no longer a PerPose
         return tuple(values) if isinstance(values, Sequence) else (values,)
 
     @property

@@ -52,17 +52,7 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     Raises:
         CaseError: the case has no value with this name.
     """
-    if name.startswith(_LIMITS):
-        _override_limit(tables, name, value)
-        return
-    if name.startswith(_PLACE):
-        _override_place(tables, name, value)
-        return
-    if _TASK.fullmatch(name):
-        _override_task(tables, name, value)
-        return
-    if name.partition(".")[0] == TURN and isinstance(tables.get("path"), dict) and "tool" in tables["path"]:
-        _override_turn(tables["path"]["tool"], name, value)
+    if _override_elsewhere(tables, name, value):
         return
     _separate_tasks(tables, name)
     if override_setting(tables, name, value):
@@ -85,6 +75,21 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         raise CaseError(name, f"cannot be set; {_allowed(name, tables, places, rotations)}")
     table, place = places[name]
     table[place] = value
+
+
+def _override_elsewhere(tables: dict[str, Any], name: str, value: float | list[float]) -> bool:
+    """Replace a value of limits, path or tasks; return whether it is one. Errors are those of the other function."""
+    if name.startswith(_LIMITS):
+        _override_limit(tables, name, value)
+    elif name.startswith(_PLACE):
+        _override_place(tables, name, value)
+    elif _TASK.fullmatch(name):
+        _override_task(tables, name, value)
+    elif name.partition(".")[0] == TURN and isinstance(tables.get("path"), dict) and "tool" in tables["path"]:
+        _override_turn(tables["path"]["tool"], name, value)
+    else:
+        return False
+    return True
 
 
 def fields_of(name: str) -> tuple[str, ...]:

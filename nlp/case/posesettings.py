@@ -17,7 +17,6 @@ from ...models.posesettings import can_follow_pose, slope_name, value_name, with
 from ..errors import CaseError
 from ..units import Units
 from .checks import check_value
-from .limits.interval import QuantityLimit
 from .limits.limits import Limits
 from .loads import Loading
 from .pose import Free, PerPose, PerTask, Value, ends_of
@@ -45,12 +44,11 @@ class Resolved(NamedTuple):
 
 
 class _Setting(NamedTuple):
-    """Setting of a case: its parameter, its name, its dotted key, its index in the parameter, and its value."""
+    """Setting of a case: its parameter, its name, its dotted key, and its value."""
 
     item: Parameter
     name: str
     key: str
-    index: int
     value: PerPose
 
 
@@ -84,23 +82,45 @@ def with_settings_resolved(
             fault = 'has no effect: write per = "pose" in the range of a dimension, or remove the key'
             raise CaseError("workspace.settings", fault, how.value)
         return Resolved(model, parameters, limits, workspace)
-    first = found[0]
     if workspace is None:
-        raise CaseError(f"{first.key}.per", "needs the table [workspace] with its poses", "pose")
+        raise CaseError(f"{found[0].key}.per", "needs the table [workspace] with its poses", "pose")
     if how is None:
-        raise CaseError("workspace.settings", f"is missing: {first.key} has per = 'pose'; write 'affine' or 'any'")
+        raise CaseError("workspace.settings", f"is missing: {found[0].key} has per = 'pose'; write 'affine' or 'any'")
     for each in found:
         _check(each, units)
-    values = {each.name: each.value for each in found}
+    _check_conflicts(limits, loading, tolerance, is_affine=how is PoseSettings.AFFINE)
     if how is PoseSettings.ANY:
-        for each in found:
-            if each.value.at is not None or each.value.slope is not None:
-                fault = "is for settings = 'affine'; with 'any' the proof chooses the value at each pose"
-                raise CaseError(f"{each.key}.{'slope' if each.value.at is None else 'at'}", fault)
-        _check_conflicts(limits, loading, tolerance, is_affine=False)
-        stated = _replaced(parameters, {name: value.range for name, value in values.items()}, model)
-        return Resolved(model, stated, limits, replace(workspace, setting_names=tuple(values)))
-    _check_conflicts(limits, loading, tolerance, is_affine=True)
+        return _any(found, model, parameters, limits, workspace)
+    return _affine(found, model, parameters, limits, workspace)
+
+
+def _any(
+    found: Sequence[_Setting], model: Model, parameters: Mapping[str, Any], limits: Limits, workspace: Workspace
+) -> Resolved:
+    """Return the parts of a case in which the ranges of settings are parameters.
+
+    Raises:
+        CaseError: a setting states a policy.
+    """
+    for each in found:
+        if each.value.at is not None or each.value.slope is not None:
+            fault = "is for settings = 'affine'; with 'any' the proof chooses the value at each pose"
+            raise CaseError(f"{each.key}.{'slope' if each.value.at is None else 'at'}", fault)
+    ranges = {each.name: each.value.range for each in found}
+    named = replace(workspace, setting_names=tuple(ranges))
+    return Resolved(model, _replaced(parameters, ranges, model), limits, named)
+
+
+def _affine(
+    found: Sequence[_Setting], model: Model, parameters: Mapping[str, Any], limits: Limits, workspace: Workspace
+) -> Resolved:
+    """Return the parts of a case in which values and slopes of settings are parameters.
+
+    Raises:
+        CaseError: settings of this robot cannot be affine, or have catalogue values.
+    """
+    from .limits.interval import QuantityLimit  # noqa: PLC0415 - most cases start without the tables of limits
+
     if workspace.about_pose:
         raise CaseError("workspace.about", "must be 'world' with settings = 'affine'", "pose")
     for each in found:
@@ -111,10 +131,9 @@ def with_settings_resolved(
     at = {each.name: _start(each.value) for each in found}
     slopes = {slope_name(each.name): _slope(each, workspace) for each in found}
     ranges = (QuantityLimit(value_name(s.name), min=s.lower, max=s.upper) for s in model.settings)
-    own = {value_name(each.name) for each in model.settings}
-    others = (each for each in limits if each.name not in own)
-    workspace = replace(workspace, setting_names=tuple(each.name for each in model.settings))
-    return Resolved(model, {**_replaced(parameters, at, model), **slopes}, Limits(*others, *ranges), workspace)
+    others = (each for each in limits if each.name not in setting_limits(model))
+    named = replace(workspace, setting_names=tuple(each.name for each in model.settings))
+    return Resolved(model, {**_replaced(parameters, at, model), **slopes}, Limits(*others, *ranges), named)
 
 
 def check_pose_settings(model: Model, workspace: Workspace | None, changes: int, *, has_path: bool) -> None:
@@ -169,7 +188,7 @@ def _settings(model: Model, parameters: Mapping[str, Any]) -> Iterator[_Setting]
                 if item.is_direction:
                     raise CaseError(key, "cannot be set for every pose: it is a direction")
                 name = item.components[k] if k < len(item.components) else item.name
-                yield _Setting(item, name, key, k, part)
+                yield _Setting(item, name, key, part)
 
 
 def _check(each: _Setting, units: Units) -> None:
@@ -235,7 +254,9 @@ def _slope(each: _Setting, workspace: Workspace) -> tuple[Value, ...]:
         return tuple(each.value.slope)
     width = each.value.range.upper - each.value.range.lower
     sizes = [high - low for low, high in map(ends_of, workspace.position)]
-    return tuple(Free(-width / size, width / size) if size > 0 and math.isfinite(width / size) else 0.0 for size in sizes)
+    return tuple(
+        Free(-width / size, width / size) if size > 0 and math.isfinite(width / size) else 0.0 for size in sizes
+    )
 
 
 def _replaced(parameters: Mapping[str, Any], values: Mapping[str, Value], model: Model) -> dict[str, Any]:
@@ -251,7 +272,6 @@ def _replaced(parameters: Mapping[str, Any], values: Mapping[str, Value], model:
             parts[item.components.index(name)] = values[name]
         found[item.name] = parts
     return found
-
 
 
 def override_setting(tables: dict[str, Any], name: str, value: float | list[float]) -> bool:

@@ -63,13 +63,13 @@ class DimensionRange(Range):
     )
     at: Value | None = Field(
         default=None,
-        description="value in the middle of the workspace, of a dimension with per = 'pose'; free within min and max if "
+        description="value in the middle of the workspace, of a dimension with per = 'pose'; free within its range if "
         "left out",
     )
     slope: Annotated[list[Value], Field(min_length=3, max_length=3)] | None = Field(
         default=None,
-        description="changes of a dimension with per = 'pose' along x, y and z of the position, per unit of length; free "
-        "if left out",
+        description="changes of a dimension with per = 'pose' along x, y and z of the position, per unit of length; "
+        "free if left out",
     )
 
     @model_validator(mode="after")

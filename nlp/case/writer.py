@@ -161,7 +161,9 @@ def _stated(case: Case, item: Parameter) -> list[Value | PerTask | PerPose]:
     for k, name in enumerate(item.components):
         value = found[k]
         if name in affine:
-            found[k] = stated_setting(case.model, name, case.components(item.name)[k], case.components(slope_name(name)))
+            found[k] = stated_setting(
+                case.model, name, case.components(item.name)[k], case.components(slope_name(name))
+            )
         elif name in names and isinstance(value, Free):
             found[k] = PerPose(value)
     return found

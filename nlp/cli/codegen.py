@@ -5,10 +5,15 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from . import options
 from .commandline import print_line
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..case.case import Case
 
 
 def codegen(
@@ -65,6 +70,9 @@ def codegen(
     if not force:
         check_folder(out)
     loaded, text, inputs = options.read_changed_case(case, settings, of).file
+    if loaded.over_path is not None and loaded.settings:
+        _write_steps(loaded, text, out, inputs, force=force)
+        return
     files = generate_c(loaded, text)
     for name in files if Path(out).is_dir() else ():
         check_outputs(inputs, {"--out": str(Path(out) / name)})
@@ -73,6 +81,22 @@ def codegen(
         print_line(loaded.stated_pose_notice)
     if not no_measure:
         files = _measured(files, identifier(loaded.name))
+    write_folder(out, files, force=force)
+    command = f"make -C {shlex.quote(one_line(out))} test"
+    print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")
+
+
+def _write_steps(case: Case, text: str, out: str, inputs: Mapping[Path, str], *, force: bool) -> None:
+    """Write the C of the next step along the path of a case."""
+    from ..embedding.schedulec import schedule_c
+    from ..errors import one_line
+    from ..output.files import check_outputs, write_folder
+
+    files = schedule_c(case, text)
+    for name in files if Path(out).is_dir() else ():
+        check_outputs(inputs, {"--out": str(Path(out) / name)})
+    size = sum(len(each.encode()) for name, each in files.items() if name.endswith((".c", ".h")))
+    print_line(f"{size / 1000:.0f} kB of C")
     write_folder(out, files, force=force)
     command = f"make -C {shlex.quote(one_line(out))} test"
     print_line(f"{len(files)} files in {one_line(out)}; {command} compiles and tests them")

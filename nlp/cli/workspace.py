@@ -8,7 +8,7 @@ from . import contents, options
 from .progress import spinner, tell_workspace
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.figure import Figure
 
@@ -106,7 +106,7 @@ def workspace(
     )
 
 
-def _refuse(given: dict[str, object]) -> None:
+def _refuse(given: Mapping[str, object]) -> None:
     """Refuse options of a workspace in which some setting must work at each pose.
 
     Raises:

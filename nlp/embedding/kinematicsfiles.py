@@ -115,6 +115,7 @@ def kinematics_files(case: Case, *, single: bool = False, coordinates: str = "po
         CaseError: as for :func:`generate_kinematics`.
         InputError: as for :func:`generate_kinematics`.
     """
+    case.refuse_settings("the rates of the motors assume dimensions that stand still")
     robot = Kinematics(case)
     limits = limits_of(robot)
     joints = None if coordinates == "pose" else limb_coordinates(robot, coordinates)

@@ -7,7 +7,7 @@ from ...models import Dimension
 from ..case.pose import Free, ends_of
 from ..evidence.state import WorkspacePose
 from ..proof.workspace.verdict import Outcome
-from ..system.jsonvalues import Absent, Inline, JsonObject
+from ..system.jsonvalues import Absent, Inline, JsonObject, Vector
 from .parts import HeadData, SettingsData, VersionsData, settings_data
 from .point import head_data, versions
 from .verdicts import pose_data
@@ -43,7 +43,7 @@ class SettingBoxData(JsonObject):
         values: value of each setting, by name.
     """
 
-    coordinates: Mapping[str, tuple[float, float]]
+    coordinates: Mapping[str, Vector]
     values: Mapping[str, float]
 
 
@@ -56,8 +56,8 @@ class PoseSettingsResult(JsonObject):
         ranges: the dimensions that are set for every pose, with their ranges.
         proved: If true, at every pose some value of the settings satisfies all limits, without a singularity.
         outcome: ``proved``; ``refuted``, with a pose at which no value works; ``open`` (undecided).
-        setting_boxes: proved boxes with their settings. If the claim is proved, they cover the workspace. Settings differ
-            from box to box, and are reset at a standstill.
+        setting_boxes: proved boxes with their settings. If the claim is proved, they cover the workspace. Settings
+            differ from box to box, and are reset at a standstill.
         pose: pose at which no value works, or middle of an undecided box; absent if the claim is proved.
         parts: number of parts of the range that were excluded at the refuting pose; absent otherwise.
         examined: number of examined boxes.
@@ -115,7 +115,7 @@ def pose_settings_of(found: "SettingsProof", settings: "Settings | None" = None)
 
 
 def policy_of(case: "Case") -> tuple[str, ...]:
-    """Return each affine setting of a case as a function of the position, in words, such as ``x1 = 25.2 - 0.85 (z - 20)``.
+    """Return each affine setting of a case as a function of the position, such as ``x1 = 25.2 - 0.85 (z - 20)``.
 
     Settings with a free value or slope are left out.
     """

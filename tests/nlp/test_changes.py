@@ -538,7 +538,7 @@ def with_poses(*names: str) -> str:
         ),
         (
             PINS.replace('per = "task"', 'per = "tsak"'),
-            "robot.parameters.x1.per = \"tsak\": must be one of 'task'",
+            "robot.parameters.x1.per = \"tsak\": must be one of 'task', 'path' or 'pose'",
         ),
         (
             PINS.replace('{ min = 5, max = 12, per = "task" }', "{ tasks = [6, 7, 8] }"),
@@ -550,7 +550,7 @@ def with_poses(*names: str) -> str:
         ),
         (
             PINS.replace("x2 = 6", "x2 = { min = 4, max = 8, rate = 2 }"),
-            "robot.parameters.x2.rate: no such key; allowed: min, max, start, per",
+            'robot.parameters.x2.rate: has an effect only with per = "path"',
         ),
         (
             PINS + "[workspace]\nposition = [0, 0, { min = 30, max = 31 }]\n",

@@ -11,6 +11,7 @@ from typing import ClassVar, Self
 from pydantic import Field, FiniteFloat, model_validator
 
 from ....models import Dimension, Model, Quantity
+from ....models.posesettings import value_name
 from ...units import Units
 from ..table import Table, fault_of
 from .constraint import BoundedConstraint, Reading, between
@@ -103,8 +104,8 @@ def quantity_named(name: str, model: Model) -> Quantity | None:
 
 
 def value_of(quantity: str, owner: str) -> str:
-    """Return the name of one value of a quantity: with the limb or joint that owns it, if any does."""
-    return f"{quantity} limb {owner}" if owner else quantity
+    """Return the name of one value of a quantity, with the limb or joint that owns it; a setting has no limb."""
+    return quantity if quantity == value_name(owner) else f"{quantity} limb {owner}"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import casadi as ca
@@ -25,6 +26,7 @@ from ...case.task import Sense
 from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import CaseError
 from ...interruption import is_requested, one_call, why_stopped, within
+from ...program.layout import Layout
 from ..enclosure.engine import kernel
 from ..statement.claims import Claim, claims_of
 from ..statement.fixed_robot import workspace_of_case
@@ -123,8 +125,13 @@ class _Existence:
         self._workspace = case.world_workspace or first
         self._fixed = frozenset(each.index for each in first.dependent)
         closed = closed_form(case.model)
-        self._samples = None if closed.model.unknowns or first.dependent else _Samples(case, closed, self._workspace)
+        self._samples = None if closed.model.unknowns or first.dependent else self._sampled(closed)
         self._closed = closed
+
+    def _sampled(self, closed: ClosedForm) -> _Samples:
+        """Return the violations as functions of settings and pose; catalogue values are points of their range."""
+        ranges = [Free(each.lower, each.upper) for each in self._ranges]
+        return _Samples(_with_values(self._case, self._names, ranges), closed, self._workspace)
 
     def run(self, progress: Callable[[int, int], None] | None) -> SettingsProof:
         """Return the verdict; the box with the worst sample comes first, so that a refuting pose is found early."""
@@ -158,8 +165,8 @@ class _Existence:
                 progress(len(proved), len(open_boxes))
         if not open_boxes:
             return self._result(Outcome.PROVED, tuple(proved), None, 0, examined, 0)
-        box = pose_box(open_boxes[-1])
-        pose = box.pose(0.5 * box.lower + 0.5 * box.upper)
+        left = pose_box(open_boxes[-1])
+        pose = left.pose(0.5 * left.lower + 0.5 * left.upper)
         return self._result(Outcome.OPEN, tuple(proved), pose, 0, examined, len(open_boxes), reason)
 
     def _result(
@@ -248,12 +255,14 @@ class _Samples:
         """Return the violations (S, P) for settings (S, k) at points (P, 6) of a box."""
         own = points[:, self._free]
         rows = [np.hstack([np.repeat(s[None], len(own), axis=0), own]) for s in settings]
-        values = np.asarray(self._function(np.concatenate(rows).T, self._arguments).full()).reshape(len(settings), len(own))
+        values = np.asarray(self._function(np.concatenate(rows).T, self._arguments).full()).reshape(
+            len(settings), len(own)
+        )
         return np.where(np.isfinite(values), values, np.inf)
 
     def _points(self, box: PoseBox) -> FloatArray:
         """Return the corners of a box, its middle, and random points (P, 6)."""
-        free = [k for k in box.free]
+        free = list(box.free)
         middle = 0.5 * box.lower + 0.5 * box.upper
         corners = np.repeat(middle[None], 2 ** len(free), axis=0)
         corners[:, free] = list(itertools.product(*((box.lower[k], box.upper[k]) for k in free)))
@@ -310,8 +319,7 @@ def _with_values(case: Case, names: Sequence[str], values: Sequence[Value]) -> C
     given = dict(zip(names, values, strict=True))
     parameters = {
         item.name: [
-            given.get(name, value)
-            for name, value in zip(item.components, case.components(item.name), strict=True)
+            given.get(name, value) for name, value in zip(item.components, case.components(item.name), strict=True)
         ]
         for item in case.model.parameters
     }
@@ -338,7 +346,8 @@ def _excluded(
         claims = list(reach_claims_on(layout, closed.reaches))
         # Beyond the reach of a limb its other quantities have no value.
         claims += [] if closed.reaches else claims_of(layout, with_objective=False)
-        if any(_is_violated(claim, lambda turned: prove_extreme(layout, turned, search).bound) for claim in claims):
+        bound_of = partial(_bound, layout, search)
+        if any(_is_violated(claim, bound_of) for claim in claims):
             done += 1
             continue
         halves = _halved(part, ranges)
@@ -346,6 +355,11 @@ def _excluded(
             return None
         parts += halves
     return done
+
+
+def _bound(layout: Layout, search: NumberSearch, claim: Claim) -> float:
+    """Return the proved bound of a quantity over the settings of a layout."""
+    return prove_extreme(layout, claim, search).bound
 
 
 def _is_violated(claim: Claim, bound_of: Callable[[Claim], float]) -> bool:
@@ -365,7 +379,7 @@ def _listed(ranges: Sequence[Free]) -> Iterator[tuple[Value, ...]]:
 
 
 def _halved(part: Sequence[Value], ranges: Sequence[Free]) -> list[tuple[Value, ...]] | None:
-    """Return the halves of a part across its widest setting, relative to the range; None for a part that is too small."""
+    """Return the halves of a part across its widest setting, relative to the range; None for too small a part."""
     shares = [
         (value.upper - value.lower) / (of.upper - of.lower) if isinstance(value, Free) else 0.0
         for value, of in zip(part, ranges, strict=True)
@@ -397,5 +411,6 @@ def _spread(ranges: Sequence[Free]) -> list[tuple[float, ...]]:
     spans = [each.upper - each.lower for each in ranges]
     found = [tuple(map(float, values)) for values in itertools.product(*axes)]
     return sorted(
-        found, key=lambda values: max((abs(v - m) / s for v, m, s in zip(values, middle, spans, strict=True)), default=0)
+        found,
+        key=lambda values: max((abs(v - m) / s for v, m, s in zip(values, middle, spans, strict=True)), default=0),
     )
