@@ -72,6 +72,7 @@ def path(
     from ..interruption import Milestone, answer_after
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
+    from ..path.settings import changing_of
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result, violating_poses
     from ..words.poses import evaluate_command
@@ -105,7 +106,11 @@ def path(
         check_library("plotly", "pages with a robot")
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
     with spinner("reading the path") as show:
-        programmed = path_of_case(loaded, choices) if along is None else read_path(along, loaded.units, choices)
+        programmed = (
+            path_of_case(loaded, choices)
+            if along is None
+            else read_path(along, loaded.units, choices, changing_of(loaded))
+        )
         premises = path_premises(proof, loaded, along, choices)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(
