@@ -37,12 +37,13 @@ from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import name_of_task, parameter_name, pose_prefixes
-from .pathfile import PathFile
+from .pathfile import TURN, PathFile
 from .pertask import check_poses, common_poses, common_value, task_value
 from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
 from .radians import angles_of, check_radians, with_radians
+from .schedule import check_settings
 from .settings import Expectation, Published, Search
-from .task import MEASURES, Method, Sense, Task
+from .task import LEG_LENGTH, MEASURES, Method, Sense, Task
 from .workspace import Workspace
 
 if TYPE_CHECKING:
@@ -84,6 +85,8 @@ class Case(Whole, Shown):
             each task. A single stated pose gives the ranges of all tasks.
         over_poses: combination of F over several poses.
         worst_everywhere: If true, the worst F over the workspace or path is optimised, not F at the stated poses only.
+        over_path: combination of F over the points of the path, mean or worst, while values with a rate change along
+            it; None if F is not optimised along the path.
         joint_centre_tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
         workspace: box of poses over which the robot is verified; None for no workspace.
         path: tool path along which the robot is verified; None for no path.
@@ -115,6 +118,7 @@ class Case(Whole, Shown):
     pose_per_task: bool = False
     over_poses: OverPoses = OverPoses.SUM
     worst_everywhere: bool = False
+    over_path: OverPoses | None = None
     joint_centre_tolerance: float | None = None
     workspace: Workspace | None = None
     path: PathFile | None = None
@@ -160,6 +164,7 @@ class Case(Whole, Shown):
         store(self, "further", _check_further_poses(self))
         store(self, "tasks", _check_tasks(self))
         _check_changes(self)
+        check_settings(self)
         _check_choices(self)
         _check_worst_everywhere(self)
         _check_loading(self)
@@ -240,6 +245,18 @@ class Case(Whole, Shown):
     def changes(self) -> tuple[str, ...]:
         """Names of what changes from task to task: components of parameters, then ``pose``; empty if nothing does."""
         return (*map(self.parameter_name, self.dimensions_per_task), *(["pose"] if self.pose_per_task else []))
+
+    @property
+    def settings(self) -> Mapping[str, Free]:
+        """Values that change along the path, by name: dimensions as in the case, then ``turn`` about the tool."""
+        found = {
+            name: value
+            for item in self.model.parameters
+            for name, value in zip(self.component_names(item), self.components(item.name), strict=True)
+            if isinstance(value, Free) and value.rate is not None
+        }
+        turn = None if self.path is None or self.path.tool is None else self.path.tool.turn
+        return {**found, TURN: turn} if isinstance(turn, Free) else found
 
     @property
     def changing_key(self) -> str:
@@ -427,7 +444,7 @@ class Case(Whole, Shown):
     def uses_forces(self) -> bool:
         """True if actuator forces under loads are limited or minimised."""
         return any(each.needs_loads for each in self.limits) or any(
-            task.measure and MEASURES[task.measure][0] for task in self.tasks
+            task.measure in MEASURES and MEASURES[task.measure][0] for task in self.tasks
         )
 
     @property
@@ -571,8 +588,14 @@ def _check_measure(case: Case, task: Task) -> None:
     if not task.measure:
         return
     key = "objective.minimise"
+    if task.measure == LEG_LENGTH:
+        if case.over_path is not OverPoses.WORST:
+            raise CaseError(key, 'needs over = "path" and as = "worst"', task.measure)
+        return
     if task.measure not in MEASURES:
-        raise CaseError(key, f"must be one of {listing(MEASURES)}", task.measure)
+        raise CaseError(key, f"must be one of {listing([*MEASURES, LEG_LENGTH])}", task.measure)
+    if case.over_path is not None:
+        raise CaseError(key, "must be 'leg_length' along a path, or left out for F", task.measure)
     if len(case.tasks) > 1:
         fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {len(case.tasks)}")

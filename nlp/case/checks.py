@@ -55,7 +55,19 @@ def check_value(
     start = value.start
     if start is not None:
         start = _check_number(start, f"{key}.start", dimension, units, (lower, upper))
-    return Free(lower, upper, start)
+    return Free(lower, upper, start, rate=_check_rate(value.rate, f"{key}.rate", dimension, units))
+
+
+def _check_rate(rate: float | None, key: str, dimension: Dimension, units: Units) -> float | None:
+    """Return the checked rate of a setting along a path; None without a rate."""
+    if rate is None:
+        return None
+    number = check_real(rate, key)
+    if not number > 0:
+        raise CaseError(key, "must be positive, or inf for no limit", units.shown(number, dimension))
+    if not math.isinf(number):
+        check_size(number, key)
+    return number
 
 
 def _check_values(value: Free, key: str, dimension: Dimension, units: Units, domain: tuple[float, float]) -> Free:

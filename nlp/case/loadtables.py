@@ -84,13 +84,20 @@ class GravityTable(Table):
 class ObjectiveTable(Table):
     """Objective: a quantity of the actuators instead of F, or the worst F over a workspace or path."""
 
-    minimise: Literal["actuator_force", "actuator_speed", "actuator_power"] | None = Field(
+    minimise: Literal["actuator_force", "actuator_speed", "actuator_power", "leg_length"] | None = Field(
         default=None,
-        description="quantity of the actuators whose largest magnitude over loads, actuators and poses is minimised",
+        description="quantity of the actuators whose largest magnitude over loads, actuators and poses is minimised; "
+        "leg_length: longest leg along the path",
     )
     over: Literal["workspace", "path"] | None = Field(
         default=None,
-        description="poses over which the worst F is optimised; limits.over must name the same ones",
+        description="poses over which the worst F is optimised; limits.over must name the same ones, or as is given",
+    )
+    as_: Literal["mean", "worst"] | None = Field(
+        default=None,
+        alias="as",
+        description="combination over the points of the path, while values with per = 'path' change along it: mean "
+        "(weighted by time, or by length without times) or worst",
     )
 
     @model_validator(mode="after")

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 from ...models import component_names
 from ..errors import CaseError, nearest
 from .names import name_of_task, parameter_name, pose_prefixes
+from .pathfile import TURN
 
 #: New values by name, in the units of the case file: a number, or three for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
@@ -22,6 +23,8 @@ _LIMITS = "limits."
 _PLACE = "path.place."
 #: Keys of the table of a free variable.
 ENDS = ("min", "max", "start")
+#: Further key of a value that changes along the path.
+RATE = "rate"
 #: Names of values of a task, such as ``task.pitch`` or ``task[1].point_x``.
 _TASK = re.compile(r"task(\[\d+\])?\..+")
 #: Names of coordinates of one of several poses, and names of dimensions of one task, such as ``x1.task2``.
@@ -57,10 +60,13 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     if _TASK.fullmatch(name):
         _override_task(tables, name, value)
         return
+    if name.partition(".")[0] == TURN and isinstance(tables.get("path"), dict) and "tool" in tables["path"]:
+        _override_turn(tables["path"]["tool"], name, value)
+        return
     _separate_tasks(tables, name)
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
-    if end in ENDS and whole in places:
+    if end in (*ENDS, RATE) and whole in places:
         table, place = places[whole]
         if not isinstance(table[place], dict):
             raise CaseError(name, f"cannot be set: {whole} is fixed; set {whole} itself")
@@ -68,6 +74,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
             raise CaseError(name, f"cannot be set: {whole} differs from task to task; set {whole}.task1.{end}")
         if "values" in table[place]:
             raise CaseError(name, f"cannot be set: {whole} has catalogue values and no bounds; set {whole} itself")
+        if end == RATE and RATE not in table[place]:
+            raise CaseError(name, f"cannot be set: {whole} does not change along the path")
         table[place][end] = value
         return
     if name not in places:
@@ -81,6 +89,8 @@ def fields_of(name: str) -> tuple[str, ...]:
     if name.startswith(_LIMITS):
         return ("limits",)
     if name.startswith(_PLACE):
+        return ("path",)
+    if name.partition(".")[0] == TURN:
         return ("path",)
     if _TASK.fullmatch(name):
         return ("tasks", "displacements", "further")  # poses may follow the screw motion of a task
@@ -143,6 +153,17 @@ def _override_place(tables: dict[str, Any], name: str, value: float | list[float
             raise CaseError(name, f"cannot be set: {_PLACE}{key} is fixed; set {_PLACE}{key} itself")
         table, key = table[key], end
     table[key] = value
+
+
+def _override_turn(tool: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace the turn about the tool, or an end of its range; errors are those of :func:`override_number`."""
+    _, _, end = name.partition(".")
+    if not end:
+        tool[TURN] = value
+    elif not isinstance(tool.get(TURN), dict):
+        raise CaseError(name, f"cannot be set: {TURN} is fixed; set {TURN} itself")
+    else:
+        tool[TURN][end] = value
 
 
 def _places(tables: dict[str, Any], name: str) -> tuple[dict[str, _Place], list[str]]:

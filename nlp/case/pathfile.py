@@ -12,8 +12,8 @@ from ...models import Dimension
 from ...models.values import dataclass
 from ..errors import CaseError
 from ..units import Units
-from .checks import check_value
-from .pose import Free, Value, written_value
+from .checks import check_direction, check_value
+from .pose import MISSING_RATE, Free, Value, written_value
 from .workspace import LARGEST_TURN, TURNS
 
 if TYPE_CHECKING:
@@ -23,6 +23,24 @@ if TYPE_CHECKING:
 Convention: TypeAlias = Literal["rpy", "xyz", "xzy", "yxz", "yzx", "zxy", "zyx"]
 #: Coordinates of the path's frame, with their dimensions: position, then rotation ``Rz(yaw) Ry(pitch) Rx(roll)``.
 PLACE = {**dict.fromkeys("xyz", Dimension.LENGTH), **dict.fromkeys(TURNS, Dimension.ANGLE)}
+
+
+#: Name of the turn about the tool's axis among the values that change along a path.
+TURN = "turn"
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Tool on the platform; its axis goes through the origin of the platform frame.
+
+    Attributes:
+        axis: (3,) direction of the axis in the platform frame, of any length but zero.
+        turn: turn of the platform about the axis, radians, added to the orientations of the path; a :class:`Free` with
+            a rate changes along the path.
+    """
+
+    axis: tuple[float, float, float]
+    turn: Value = 0.0
 
 
 @dataclass(frozen=True)
@@ -42,6 +60,8 @@ class PathFile:
         end_of_file: If true, the end of the file ends the G-code, which then needs no M2, M30 or %.
         part: number of the part of a printer's G-code that is the path, from 1; None for the only part.
         macros: names of a printer's macros that the G-code may call; their motions are not in the file.
+        tool: axis of the tool, and the turn about it; None for no tool.
+        periodic: If true, values that change along the path are equal at its first and last point.
         place: (6,) pose of the path's frame in the world frame: position, then roll, pitch and yaw, radians; each fixed
             or free.
         has_limits: If true, a solve finds a design without singularities and violated limits along the whole path.
@@ -60,6 +80,8 @@ class PathFile:
     end_of_file: bool = False
     part: int | None = None
     macros: Sequence[str] = ()
+    tool: Tool | None = None
+    periodic: bool = False
 
     def check(self, units: Units) -> None:
         """Check the pose of the path's frame.
@@ -75,6 +97,11 @@ class PathFile:
         for (name, dimension), value in zip(PLACE.items(), self.place, strict=True):
             domain = (-LARGEST_TURN, LARGEST_TURN) if dimension is Dimension.ANGLE else (-math.inf, math.inf)
             check_value(value, f"path.place.{name}", dimension, units, domain)
+        if self.tool is not None:
+            check_direction(self.tool.axis, "path.tool.axis")
+            turn = check_value(self.tool.turn, "path.tool.turn", Dimension.ANGLE, units, (-LARGEST_TURN, LARGEST_TURN))
+            if isinstance(turn, Free) and turn.rate is None:
+                raise CaseError("path.tool.turn.rate", MISSING_RATE)
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -103,5 +130,13 @@ class PathFile:
             "end_of_file": self.end_of_file or None,
             "part": self.part,
             "macros": list(self.macros) or None,
+            "tool": None if self.tool is None else self._tool(self.tool, units),
+            "periodic": self.periodic or None,
             "place": place if any(value is not None for value in place.values()) else None,
         }
+
+    @staticmethod
+    def _tool(tool: Tool, units: Units) -> TomlValue:
+        """Return the table of the tool."""
+        turn = {} if tool.turn == 0 else {TURN: written_value(tool.turn, units, Dimension.ANGLE)}
+        return {"axis": list(tool.axis), **turn}

@@ -33,6 +33,8 @@ ROUNDING = 1e-6
 #: Largest angle of a rotation about a free axis. Its variables are the vector part of a quaternion, which is a smooth
 #: function of the rotation only below half a turn.
 MAX_FREE_ROTATION = math.radians(179)
+#: Fault of a value that changes along the path without a rate.
+MISSING_RATE = "is missing: a number that changes along the path needs its largest rate, or inf"
 #: Largest magnitude of a number in a case, and inverse of the smallest twist: squares and fourth powers stay finite.
 LARGEST = 1e30
 
@@ -47,12 +49,15 @@ class Free:
         start: value at the first starting point; None for the middle.
         values: catalogue values, ascending from ``lower`` to ``upper``, of which the solver chooses one; empty for a
             continuous variable. Only dimensions of a robot can have them.
+        rate: largest rate of change, per second, of a setting: a value that changes along the tool path of the case;
+            infinite for no limit. None for a value that is the same along the path.
     """
 
     lower: float
     upper: float
     start: float | None = None
     values: tuple[float, ...] = ()
+    rate: float | None = None
 
     @classmethod
     def among(cls, values: Iterable[float]) -> Free:
@@ -142,18 +147,19 @@ def internal_dimension(written: Any, units: Units, dimension: Dimension) -> Valu
     if isinstance(written, StatedTasks):
         return PerTask(tuple(internal_value(each, units, dimension) for each in written.tasks))
     value = internal_value(written, units, dimension)
-    return PerTask((value,)) if getattr(written, "per", None) else value
+    return PerTask((value,)) if getattr(written, "per", None) == "task" else value
 
 
 def written_dimension(value: Value | PerTask, units: Units, dimension: Dimension) -> TomlValue:
     """Return the value of a dimension as TOML, the inverse of :func:`internal_dimension`."""
     if not isinstance(value, PerTask):
-        return written_value(value, units, dimension)
-    written = [written_value(each, units, dimension) for each in value.values]
-    first = written[0]
-    if isinstance(first, dict) and all(each == first for each in written):
+        written = written_value(value, units, dimension)
+        return {**written, "per": "path"} if isinstance(written, dict) and "rate" in written else written
+    of_tasks = [written_value(each, units, dimension) for each in value.values]
+    first = of_tasks[0]
+    if isinstance(first, dict) and all(each == first for each in of_tasks):
         return {**first, "per": "task"}
-    return {"tasks": written}
+    return {"tasks": of_tasks}
 
 
 def internal_value(written: float | StatedRange | StatedValues, units: Units, dimension: Dimension) -> Value:
@@ -167,6 +173,7 @@ def internal_value(written: float | StatedRange | StatedValues, units: Units, di
         units.to_internal(written.min, dimension),
         units.to_internal(written.max, dimension),
         None if start is None else units.to_internal(start, dimension),
+        rate=None if (rate := getattr(written, "rate", None)) is None else units.to_internal(rate, dimension),
     )
 
 
@@ -177,6 +184,7 @@ def written_value(value: Value, units: Units, dimension: Dimension) -> TomlValue
     if value.values:
         return {"values": [units.written(each, dimension) for each in value.values]}
     ends = {"min": value.lower, "max": value.upper, "start": value.start}
+    ends |= {} if value.rate is None else {"rate": value.rate}
     return {key: None if end is None else units.written(end, dimension) for key, end in ends.items()}
 
 

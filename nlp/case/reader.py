@@ -282,6 +282,7 @@ def _case_of(
         pose_per_task=of_tasks,
         over_poses=over_poses,
         worst_everywhere=written.read_worst_everywhere(),
+        over_path=written.read_over_path(),
         limits=Limits.from_table(written.limits, model, units),
         joint_centre_tolerance=None if written.tolerance is None else written.tolerance.joint_centre,
         workspace=written.read_workspace(units),
@@ -422,6 +423,11 @@ def _task(written: TaskTable, index: int) -> Task:
         CaseError: the motion is stated both by a screw and by a twist, or axis, point or pitch is missing or invalid.
     """
     key, name = f"task[{index}]", written.name or f"task {index + 1}"
+    if written.follows is not None:
+        for part in ("axis", "point", "pitch", "twist"):
+            if getattr(written, part) is not None:
+                raise CaseError(f"{key}.{part}", "conflicts with follows; state the motion in one way")
+        return Task.following(written.follows, sense=written.sense, name=name, weight=written.weight)
     if written.twist is None:
         twist = unit_twist(written.axis, written.point, written.pitch, key)
         point = None if written.pitch == math.inf else written.point

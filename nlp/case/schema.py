@@ -19,6 +19,7 @@ from ..units import Units
 from .case import Case
 from .loads import NO_LOADING, Loading
 from .pathfile import PathFile
+from .pose import MISSING_RATE, OverPoses
 from .settings import Expectation, Published, Search
 from .table import FileName, Later, Range, Table, Value, Vector, empty_list, fault_of, tag_of_number
 from .task import Task
@@ -52,9 +53,23 @@ Per = Literal["task"]
 class DimensionRange(Range):
     """Range of a free dimension."""
 
-    per: Per | None = Field(
-        default=None, description="task: the dimension is set anew for every task; the same for all tasks if left out"
+    per: Literal["task", "path"] | None = Field(
+        default=None,
+        description="task: the dimension is set anew for every task; path: it changes along the tool path; the same "
+        "value everywhere if left out",
     )
+    rate: float | None = Field(
+        default=None, description="largest change per second of a dimension with per = 'path'; inf for no limit"
+    )
+
+    @model_validator(mode="after")
+    def _refuse_rate_alone(self) -> DimensionRange:
+        """Refuse a change along the path without its largest rate, and a rate without a change along the path."""
+        if self.per == "path" and self.rate is None:
+            raise fault_of("rate", MISSING_RATE)
+        if self.per != "path" and self.rate is not None:
+            raise fault_of("rate", 'has an effect only with per = "path"')
+        return self
 
 
 class Listed(Table):
@@ -308,6 +323,11 @@ class TaskTable(Table):
         description="twist [omega, v]: angular velocity of the platform and velocity of its point at the world origin, "
         "instead of axis, point and pitch",
     )
+    follows: Literal["feed", "tool", "thrust"] | None = Field(
+        default=None,
+        description="motion that moves with the tool path, instead of axis, point and pitch; feed: translation in the "
+        "direction of the feed; tool: rotation about the tool's axis; thrust: translation along the tool's axis",
+    )
 
 
 class CombineTable(Table):
@@ -479,12 +499,24 @@ class Document(Table):
         Raises:
             CaseError: the limits are not over the same poses.
         """
-        if self.objective is None or self.objective.over is None:
+        if self.objective is None or self.objective.over is None or self.objective.as_ is not None:
             return False
         over = self.objective.over
         if not self._has_limits_over(over):
             raise CaseError("objective.over", f"needs limits over the same poses: [limits] over = '{over}'", over)
         return self.objective.minimise is None  # a quantity of the actuators covers all these poses anyway
+
+    def read_over_path(self) -> OverPoses | None:
+        """Return the combination of F over the points of the path; None if F is not optimised along the path.
+
+        Raises:
+            CaseError: the combination is stated for other poses than those of a path.
+        """
+        if self.objective is None or self.objective.as_ is None:
+            return None
+        if self.objective.over != "path":
+            raise CaseError("objective.as", 'needs over = "path"', self.objective.as_)
+        return OverPoses(self.objective.as_)
 
     def _has_limits_over(self, poses: str) -> bool:
         """Return True if the limits are over some poses, ``workspace`` or ``path``."""

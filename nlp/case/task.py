@@ -17,6 +17,10 @@ if TYPE_CHECKING:
 
 #: Quantities of the actuators that can be minimised; for each, whether it needs loads, and whether it needs motions.
 MEASURES = {"actuator_force": (True, False), "actuator_speed": (False, True), "actuator_power": (True, True)}
+#: Name of the longest leg along a path as objective, which needs neither loads nor motions.
+LEG_LENGTH = "leg_length"
+#: Motions that move with a tool path.
+FOLLOWS = ("feed", "tool", "thrust")
 
 
 class Sense(enum.Enum):
@@ -43,6 +47,8 @@ class Task:
         point: (3,) point of the screw axis as stated, length; None for a translation, or for a task given as a twist.
         measure: quantity of the actuators that is minimised instead of F, such as ``actuator_force``; empty for F.
         is_stated: If true, the case states the motion; if false, the twist is a placeholder of an objective without F.
+        follows: motion that moves with the tool path of the case: ``"feed"``, ``"tool"`` or ``"thrust"``; the twist is
+            then a placeholder. Empty for a fixed motion.
     """
 
     twist: ArrayLike
@@ -52,6 +58,7 @@ class Task:
     point: ArrayLike | None = None
     measure: str = ""
     is_stated: bool = True
+    follows: str = ""
 
     @classmethod
     def minimise(cls, measure: str) -> Task:
@@ -62,6 +69,19 @@ class Task:
                 loads, actuators and poses is minimised.
         """
         return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, measure, measure=measure, is_stated=False)
+
+    @classmethod
+    def following(cls, motion: str, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0) -> Task:
+        """Return the task of a unit motion that moves with the tool path of the case.
+
+        Args:
+            motion: ``"feed"``, a translation in the direction of the feed; ``"tool"``, a rotation about the tool's
+                axis; or ``"thrust"``, a translation along the tool's axis.
+            sense: sense of optimisation of F, ``"max"`` or ``"min"``.
+            name: name of the task.
+            weight: positive weight of the task in a combination of several tasks.
+        """
+        return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense(sense), name, weight, follows=motion)
 
     @classmethod
     def screw(

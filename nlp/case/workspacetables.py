@@ -9,11 +9,11 @@ from pydantic import ConfigDict, Discriminator, Field, FiniteFloat, Tag, model_v
 from ...models import Dimension, unit_vector
 from ..units import Units
 from .checks import check_direction
-from .pathfile import PLACE, Convention, PathFile
-from .pose import internal_value
+from .pathfile import PLACE, Convention, PathFile, Tool
+from .pose import MISSING_RATE, internal_value
 from .positionsets import PositionSet
 from .positiontables import PositionSetTable, Span
-from .table import FileName, Table, Value, Vector, fault_of
+from .table import FileName, Range, Table, Value, Vector, fault_of, tag_of_number
 from .workspace import TURNS, TurnKind, Turns, Workspace
 
 
@@ -103,6 +103,37 @@ class PlaceTable(Table):
     yaw: Value = Field(default=0.0, description="third rotation of the path's frame, about the world z axis")
 
 
+class TurnTable(Range):
+    """Free turn of the platform about the tool's axis, which changes along the path."""
+
+    rate: float | None = Field(default=None, description="largest change per second; inf for no limit")
+
+    @model_validator(mode="after")
+    def _refuse_without_rate(self) -> TurnTable:
+        """Refuse a turn without its largest rate."""
+        if self.rate is None:
+            raise fault_of("rate", MISSING_RATE)
+        return self
+
+
+class ToolTable(Table):
+    """Tool on the platform, whose axis goes through the origin of the platform frame."""
+
+    axis: Vector = Field(description="direction of the tool's axis in the platform frame, of any length but zero")
+    turn: Annotated[
+        Annotated[FiniteFloat, Tag("<number>")] | Annotated[TurnTable, Tag("<range>")], Discriminator(tag_of_number)
+    ] = Field(
+        default=0.0,
+        description="turn of the platform about the tool's axis, added to the path's orientations: a number, or "
+        "{ min, max, rate } for a turn that changes along the path",
+    )
+
+    def read(self, units: Units) -> Tool:
+        """Return the tool."""
+        x, y, z = self.axis
+        return Tool((x, y, z), internal_value(self.turn, units, Dimension.ANGLE))
+
+
 class PathTable(Table):
     """Tool path along which the robot is verified."""
 
@@ -140,6 +171,10 @@ class PathTable(Table):
     place: PlaceTable | None = Field(
         default=None, description="pose of the path's frame in the world frame; if left out, both frames are equal"
     )
+    tool: ToolTable | None = Field(default=None, description="axis of the tool, and the free turn about it")
+    periodic: bool = Field(
+        default=False, description="If true, values that change along the path are equal at its first and last point"
+    )
 
     def read(self, folder: str, units: Units, *, has_limits: bool) -> PathFile:
         """Return the tool path.
@@ -154,6 +189,7 @@ class PathTable(Table):
             0.0 if stated is None else internal_value(getattr(stated, name), units, dimension)
             for name, dimension in PLACE.items()
         )
+        given["tool"] = None if self.tool is None else self.tool.read(units)
         return PathFile(folder=folder, has_limits=has_limits, **given)
 
 

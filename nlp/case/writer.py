@@ -85,7 +85,7 @@ def with_settings(case: Case, settings: Mapping[str, float | ArrayLike]) -> Case
         further = zip(case.further, read.further, strict=True)
         found["further"] = [replace(new, rotation=_as_stated(old.rotation, new.rotation)) for old, new in further]
     if case.path is not None and read.path is not None and "path" in found:
-        found["path"] = replace(case.path, place=read.path.place)
+        found["path"] = replace(case.path, place=read.path.place, tool=read.path.tool)
     return replace(case, **found)
 
 
@@ -128,7 +128,9 @@ def _lines(case: Case) -> Iterator[str]:
         if task.is_stated:
             yield from toml_table("[[task]]", _task(task))
         over = case.limits_over if case.worst_everywhere else None
-        yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over})
+        along = None if case.over_path is None else case.over_path.value
+        over = over or along and "path"
+        yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over, "as": along})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
     yield from toml_table("[controller]", case.controller.to_keys(driven_joints(model), units))
@@ -235,6 +237,9 @@ def _pose(case: Case, pose: Pose) -> dict[str, TomlValue | None]:
 
 def _task(task: Task) -> dict[str, TomlValue | None]:
     """Return the table of a task."""
+    weight = task.weight if task.weight != Task.weight else None
+    if task.follows:
+        return {"name": task.name, "sense": task.sense.value, "follows": task.follows, "weight": weight}
     twist = np.asarray(task.twist, dtype=np.float64)
     motion: dict[str, TomlValue | None] = {"twist": twist.tolist()}
     screw = axis_from_screw(twist)
@@ -246,7 +251,6 @@ def _task(task: Task) -> dict[str, TomlValue | None]:
     is_screw = math.isinf(pitch) == (point is None)
     if is_screw and np.array_equal(unit_twist(axis, point, pitch, "task"), twist):
         motion = {"axis": axis, "point": point, "pitch": pitch}
-    weight = task.weight if task.weight != Task.weight else None
     return {"name": task.name, "sense": task.sense.value, **motion, "weight": weight}
 
 
