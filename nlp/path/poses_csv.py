@@ -91,9 +91,13 @@ def _settings(table: NumberTable, changing: Changing, units: Units) -> _Set:
         InputError: a value is out of its range, or changes too fast.
     """
     values = changing.values_of(table, units)
-    found = _Set(warnings=tuple(
-        f"column {name}: not used, because the case fixes {name}" for name in table.columns if name in changing.fixed
-    ))
+    found = _Set(
+        warnings=tuple(
+            f"column {name}: not used, because the case fixes {name}"
+            for name in table.columns
+            if name in changing.fixed
+        )
+    )
     if changing.axis is not None:
         found["tool"] = ToolTurn(changing.axis, values.get(TURN, np.full(len(table.rows), changing.turn)))
     if changing.own:
