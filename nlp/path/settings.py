@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...models import Dimension, FloatArray
 from ..case.pathfile import TURN
 from ..case.pose import Free
+from ..case.task import LEG_LENGTH, Task
 from ..errors import InputError
 from ..units import Units
 
@@ -168,6 +169,27 @@ class Changing:
                 f"{source}: states no {name}, which changes along the path; give --along a table (.csv) "
                 f"with a column {name}, or fix the value with --set {name}=.."
             )
+
+
+def case_along(case: Case, settings: Settings) -> Case:
+    """Return a case whose dimensions have their ranges along a path, and no objective along the path.
+
+    Such an objective, and its motions, are about schedules; a proof is about one of them.
+    """
+    if case.over_path is None:
+        return case
+    parameters: dict[str, Any] = dict(case.parameters)
+    for item in case.model.parameters:
+        values = list(case.components(item.name))
+        for k, name in enumerate(item.components):
+            if name in settings.names and settings.values is not None:
+                own = settings.values[:, settings.names.index(name)]
+                low, high = float(own.min()), float(own.max())
+                values[k] = Free(low, high) if low < high else low
+        parameters[item.name] = values if len(values) > 1 else values[0]
+    stated = tuple(task for task in case.tasks if not (task.follows or task.measure == LEG_LENGTH))
+    tasks = stated or (replace(Task.translation((0.0, 0.0, 1.0)), is_stated=False),)
+    return replace(case, parameters=parameters, tasks=tasks, over_path=None, path=None)
 
 
 #: No tool, and no quantity that changes.

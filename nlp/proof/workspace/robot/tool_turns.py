@@ -1,7 +1,7 @@
 """Rotations of a path with a turn about the tool's axis, as ranges of Cayley vectors.
 
-The rotation ``R(s) = R_task(s) R_tool(psi(s))`` has one more factor than the path's orientations: a turn about an axis of
-the platform, by an angle that changes linearly. Each factor of its quaternion is an exponential of a linear
+The rotation ``R(s) = R_task(s) R_tool(psi(s))`` has one more factor than the path's orientations: a turn about an axis
+of the platform, by an angle that changes linearly. Each factor of its quaternion is an exponential of a linear
 function. So the second derivative is at most the square of half the sum of all rates, as for angles of any convention,
 and the same bound of the distance from a chord is valid; see :mod:`.path_turns`.
 """
@@ -87,7 +87,6 @@ class ToolTurns:
         within: FloatArray | None = None,  # noqa: ARG002
     ) -> tuple[FloatArray, FloatArray]:
         """Return ranges over pieces; see :class:`~.path_turns.PathTurns`."""
-
         return chord_hull(self, segments, ends, self._off(segments), self._vary)
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
