@@ -6,30 +6,21 @@ messages in the words of case files, so that all other modules can rely on valid
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array, unit_vector
+from ...models import Dimension, Displacement, FloatArray, Model, Parameter, component_names, frozen_array
 from ...models.shown import Shown
 from ...models.statics import driven_joints
 from ...models.values import dataclass
 from ...models.whole import Whole
-from ..errors import CaseError, NoRobotError, listing, nearest
+from ..errors import CaseError, NoRobotError
 from ..units import Units
-from .checks import (
-    check_determined_joints,
-    check_direction,
-    check_real,
-    check_reals,
-    check_statics,
-    check_value,
-    check_vector,
-)
+from .checks import check_determined_joints, check_real, check_tolerance
 from .controller import SAME, Controller
 from .excursions import OutsideWorkspace, check_excursions, in_world, outside_workspace, refuse_free
 from .existence import assembly_fault
@@ -37,31 +28,20 @@ from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
 from .names import name_of_task, parameter_name, pose_prefixes
+from .parameters import check_choices, check_parameters
 from .pathfile import TURN, PathFile
-from .pertask import check_poses, common_poses, common_value, task_value
-from .pose import LARGEST, MAX_FREE_ROTATION, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
+from .pertask import Station, check_poses, common_poses, common_value, stations, task_value
+from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerTask, Pose, Rotation, Value
+from .posechecks import check_displacements, check_further_poses, check_position, check_rotation
 from .radians import angles_of, check_radians, with_radians
 from .schedule import check_settings
 from .settings import Expectation, Published, Search
-from .task import LEG_LENGTH, MEASURES, Method, Sense, Task
+from .task import MEASURES, Method, Task
+from .taskchecks import check_loading, check_tasks
 from .workspace import Workspace
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
-
-
-class Station(NamedTuple):
-    """Pose of the robot in a case.
-
-    Attributes:
-        task: index of the only task at this pose; None if every task takes it.
-        pose: index of the stated pose.
-        step: displacement from the stated pose.
-    """
-
-    task: int | None
-    pose: int
-    step: Displacement
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,26 +133,28 @@ class Case(Whole, Shown):
             CaseError: a value is not allowed.
         """
         store = object.__setattr__
-        store(self, "parameters", MappingProxyType(_check_parameters(self)))
+        checked = check_parameters(self.parameters, self.model, len(self.tasks), self.units)
+        store(self, "parameters", MappingProxyType(checked))
         known = {} if self.dimensions_per_task else self.parameters
         if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
             raise NoRobotError("robot.parameters", fault, source=self.source)
-        store(self, "position", _check_position(self, self.position, "pose"))
-        store(self, "rotation", _check_rotation(self, self.rotation, "pose"))
+        store(self, "position", check_position(self.position, "pose", self.units))
+        store(self, "rotation", check_rotation(self.rotation, "pose", self.units))
         if self.pose_per_task and not self.further:
             store(self, "further", [Pose(self.position, self.rotation, self.displacements)] * (len(self.tasks) - 1))
-        store(self, "further", _check_further_poses(self))
-        store(self, "tasks", _check_tasks(self))
+        store(self, "further", check_further_poses(self.further, self.units))
+        check_displacements(self.poses, self.over_poses, len(self.tasks))
+        store(self, "tasks", check_tasks(self.tasks, self.model, self.loading))
         _check_changes(self)
         check_settings(self)
-        _check_choices(self)
+        check_choices(checked, self.model, self.tasks, self.method)
         _check_worst_everywhere(self)
-        _check_loading(self)
+        check_loading(self.loading, self.model, self.units)
         self.controller.check(driven_joints(self.model), self.units)
         self.limits.check(self.as_limited)
         if self.limits_over:
             check_determined_joints(self.model, "limits.over", self.source)
-        _check_tolerance(self)
+        check_tolerance(self.joint_centre_tolerance, self.model, self.workspace is not None)
         if self.workspace is not None:
             self.workspace.check(self.units)
             check_excursions(self.workspace, self.poses[0], self.pose_count, self.units)
@@ -393,16 +375,7 @@ class Case(Whole, Shown):
     @property
     def stations(self) -> tuple[Station, ...]:
         """Poses of the robot in order: the poses of the first task, then those of the second, and so on."""
-        poses = [(k, step) for k, pose in enumerate(self.poses) for step in pose.displacements]
-        if not self.changes:
-            return tuple(Station(None, k, step) for k, step in poses)
-        count = len(self.poses) // len(self.tasks)
-        return tuple(
-            Station(task, k, step)
-            for task in range(len(self.tasks))
-            for k, step in poses
-            if not self.pose_per_task or k // count == task
-        )
+        return stations(self.poses, len(self.tasks) if self.changes else 0, self.pose_per_task)
 
     @property
     def pose_prefixes(self) -> tuple[str, ...]:
@@ -537,271 +510,5 @@ def _check_worst_everywhere(case: Case) -> None:
         raise CaseError("combine.over_poses", "must be 'worst' together with objective.over", case.over_poses.value)
 
 
-def _check_loading(case: Case) -> None:
-    """Refuse invalid loads and motions, and robots whose actuator forces do not follow from the loads.
-
-    Raises:
-        CaseError: loads, motion, gravity or stiffness are not allowed.
-    """
-    case.loading.check(case.units)
-    loading = case.loading
-    parts = (("load", loading.loads), ("motion", loading.motion), ("robot.actuator_stiffness", loading.stiffness))
-    stated = [key for key, given in parts if given]
-    if stated:
-        check_statics(case.model, stated[0])
-        loading.check_work(case.model)
-    if loading.stiffness is not None:
-        loading.stiffness_of([joint.name for joint in driven_joints(case.model)])
-
-
-def _check_choices(case: Case) -> None:
-    """Refuse catalogue values of directions, and combinations of tasks that do not allow catalogue values.
-
-    Raises:
-        CaseError: a parameter or the combination is not allowed.
-    """
-    listed = [
-        item
-        for item in case.model.parameters
-        if any(isinstance(value, Free) and value.values for value in case.components(item.name))
-    ]
-    for item in listed:
-        key = f"robot.parameters.{item.name}"
-        if item.is_direction:
-            raise CaseError(key, "must be numbers or { min, max }: a direction cannot have { values }")
-        if len(case.tasks) > 1 and case.method is Method.AVERAGE:
-            fault = f"must be 'weighted-sum' or 'worst-case': {key} has catalogue values"
-            is_shared = not case.dimensions_per_task.keys() & set(item.components)
-            fault += ", and an average of catalogue values need not be a catalogue value" if is_shared else ""
-            raise CaseError("combine.method", fault, case.method.value)
-        if case.method is Method.WORST_CASE and len({task.sense for task in case.tasks}) > 1:
-            fault = f"must be 'weighted-sum': {key} has catalogue values, and tasks have both senses"
-            raise CaseError("combine.method", fault, case.method.value)
-
-
-def _check_measure(case: Case, task: Task) -> None:
-    """Refuse an objective of the actuators for which loads, motion or a suitable robot is missing.
-
-    Raises:
-        CaseError: the objective is not allowed.
-    """
-    if not task.measure:
-        return
-    key = "objective.minimise"
-    if task.measure == LEG_LENGTH:
-        if case.over_path is not OverPoses.WORST:
-            raise CaseError(key, 'needs over = "path" and as = "worst"', task.measure)
-        return
-    if task.measure not in MEASURES:
-        raise CaseError(key, f"must be one of {listing([*MEASURES, LEG_LENGTH])}", task.measure)
-    if case.over_path is not None:
-        raise CaseError(key, "must be 'leg_length' along a path, or left out for F", task.measure)
-    if len(case.tasks) > 1:
-        fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
-        raise CaseError("task", f"{fault}, got {len(case.tasks)}")
-    if task.sense is not Sense.MIN:
-        fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'
-        raise CaseError("task[0].sense", fault, "max")
-    needs_loads, needs_motion = MEASURES[task.measure]
-    if needs_loads and not case.loading.loads:
-        raise CaseError(key, "needs a table [[load]] with a load on the platform", task.measure)
-    if needs_motion and case.loading.motion is None:
-        raise CaseError(key, "needs the table [motion] with the largest speeds of the platform", task.measure)
-    check_statics(case.model, key, task.measure)
-    joints = driven_joints(case.model)
-    if task.measure != "actuator_power" and len({joint.dimension for joint in joints}) > 1:
-        fault = "compares all actuators, but the robot has revolute and prismatic ones; minimise actuator_power"
-        raise CaseError(key, fault, task.measure)
-
-
 def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def _check_parameters(case: Case) -> dict[str, tuple[Value | PerTask, ...]]:
-    """Return the components of every parameter in the model's order, a fixed direction as a unit vector.
-
-    Raises:
-        CaseError: a parameter is unknown or missing, or a value is not allowed.
-    """
-    known = {parameter.name: parameter for parameter in case.model.parameters}
-    for name in case.parameters:
-        if name not in known:
-            raise CaseError(f"robot.parameters.{name}", f"no such parameter; {nearest(name, known)}")
-    components: dict[str, tuple[Value | PerTask, ...]] = {}
-    for name, parameter in known.items():
-        key = f"robot.parameters.{name}"
-        if name not in case.parameters:
-            raise CaseError(key, f"is missing: {parameter.description}; give {_allowed_form(parameter)}")
-        given = case.parameters[name]
-        if isinstance(given, str | bytes):  # a sequence too, but of no numbers
-            check_real(given, key)
-        values: tuple[Value | PerTask, ...] = tuple(given) if isinstance(given, Sequence) else (given,)
-        if len(values) != len(parameter.typical):
-            raise CaseError(key, f"must be {_allowed_form(parameter)}")
-        if parameter.is_direction and any(isinstance(value, PerTask) for value in values):
-            raise CaseError(key, "must be the same for every task: a direction cannot change from task to task")
-        if parameter.is_direction and not any(isinstance(value, Free) for value in values):
-            components[name] = tuple(float(part) for part in unit_vector(check_direction(values, key)))  # type: ignore[arg-type]
-            continue
-        keys = [key] if len(values) == 1 else [f"{key}[{index}]" for index in range(len(values))]
-        domain = (parameter.lower, parameter.upper)
-        components[name] = tuple(
-            _check_each(value, place, parameter.dimension, case, domain)
-            for value, place in zip(values, keys, strict=True)
-        )
-    return components
-
-
-def _check_each(
-    value: Value | PerTask, key: str, dimension: Dimension, case: Case, domain: tuple[float, float]
-) -> Value | PerTask:
-    """Return a checked value, or the checked value for each task; arguments and errors are those of ``check_value``."""
-    if not isinstance(value, PerTask):
-        return check_value(value, key, dimension, case.units, domain)
-    given = tuple(value.values)
-    given = given * len(case.tasks) if len(given) == 1 else given
-    if len(given) != len(case.tasks):
-        raise CaseError(
-            f"{key}.tasks", f"must have one value for each of the {len(case.tasks)} tasks, got {len(given)}"
-        )
-    keys = [key if len(value.values) == 1 else f"{key}.tasks[{k}]" for k in range(len(given))]
-    return PerTask(
-        tuple(check_value(each, place, dimension, case.units, domain) for each, place in zip(given, keys, strict=True))
-    )
-
-
-def _allowed_form(parameter: Parameter) -> str:
-    """Return the form of a parameter's value in a case file, for messages."""
-    one = "a number or { min, max } or { values }"
-    return one if len(parameter.typical) == 1 else f"a list of {len(parameter.typical)}, each {one}"
-
-
-def _check_position(case: Case, position: Sequence[Value], pose: str) -> tuple[Value, ...]:
-    """Return the checked position of a stated pose.
-
-    Args:
-        case: the case, for its units.
-        position: position of the pose.
-        pose: dotted key of the pose, for messages.
-
-    Raises:
-        CaseError: there are not three coordinates, or a coordinate is not allowed.
-    """
-    if len(position) != 3:
-        fault = f"must be a list of 3, each a number or {{ min, max }}, got {len(position)}"
-        raise CaseError(f"{pose}.position", fault)
-    return tuple(
-        check_value(value, f"{pose}.position[{index}]", Dimension.LENGTH, case.units)
-        for index, value in enumerate(position)
-    )
-
-
-def _check_rotation(case: Case, given: Rotation, pose: str) -> Rotation:
-    """Return the checked rotation of a stated pose; a fixed axis becomes a unit vector.
-
-    Args:
-        case: the case, for its units.
-        given: rotation of the pose.
-        pose: dotted key of the pose, for messages.
-
-    Raises:
-        CaseError: the angle is too large, its bounds are not symmetric about a free axis, or the axis is zero.
-    """
-    key = f"{pose}.rotation.angle"
-    if given.axis is None:
-        largest, why = MAX_FREE_ROTATION, "with a free axis"
-    else:
-        largest, why = 2 * math.pi, "with a fixed axis"
-    angle = check_value(given.angle, key, Dimension.ANGLE, case.units)
-    ends = {f"{key}.min": angle.lower, f"{key}.max": angle.upper} if isinstance(angle, Free) else {key: angle}
-    for place, end in ends.items():
-        if abs(end) > largest:
-            allowed = case.units.text(largest, Dimension.ANGLE)
-            raise CaseError(
-                place, f"must be at most {allowed} in magnitude {why}", case.units.shown(end, Dimension.ANGLE)
-            )
-    lopsided = isinstance(angle, Free) and angle.lower < 0 < angle.upper and not math.isclose(-angle.lower, angle.upper)
-    if given.axis is None and isinstance(angle, Free) and lopsided:
-        fault = "must be -max, or have the sign of max: about a free axis the sign of an angle has no meaning"
-        raise CaseError(f"{key}.min", fault, case.units.shown(angle.lower, Dimension.ANGLE))
-    axis = None if given.axis is None else unit_vector(check_direction(given.axis, f"{pose}.rotation.axis"))
-    return Rotation(axis, angle, given.form)
-
-
-def _check_further_poses(case: Case) -> tuple[Pose, ...]:
-    """Return the checked stated poses after the first.
-
-    Raises:
-        CaseError: a coordinate is not allowed, a pose has no displacement, or the worst F over poses is requested for
-            several tasks.
-    """
-    keys = [f"pose[{k + 1}]" for k in range(len(case.further))]
-    poses = tuple(
-        Pose(
-            _check_position(case, pose.position, key),
-            _check_rotation(case, pose.rotation, key),
-            tuple(pose.displacements),
-        )
-        for pose, key in zip(case.further, keys, strict=True)
-    )
-    displacements = [case.displacements, *(pose.displacements for pose in poses)]
-    for key, moves in zip(["pose", *keys], displacements, strict=True):
-        if not moves:
-            raise CaseError(key, "must have at least one displacement, got none")
-    if sum(map(len, displacements)) > 1 and case.over_poses is OverPoses.WORST and len(case.tasks) > 1:
-        raise CaseError("combine.over_poses", "must be 'sum' or 'mean' with several tasks", case.over_poses.value)
-    return poses
-
-
-def _check_tasks(case: Case) -> tuple[Task, ...]:
-    """Return the checked tasks, with twists as arrays (6,).
-
-    Raises:
-        CaseError: there is no task, a twist or weight is not allowed, or two tasks have the same name.
-    """
-    if not case.tasks:
-        raise CaseError("task", "is missing: a case needs at least one [[task]]")
-    tasks = []
-    for index, task in enumerate(case.tasks):
-        key = f"task[{index}]"
-        twist = check_reals(task.twist, f"{key}.twist")
-        if twist.shape != (6,) or not np.isfinite(twist).all():
-            raise CaseError(f"{key}.twist", "must be six finite numbers", twist.tolist())
-        size = float(np.abs(twist).max())
-        if size == 0:
-            raise CaseError(f"{key}.twist", "must not be zero: the platform would not move", twist.tolist())
-        if not 1 / LARGEST <= size <= LARGEST:
-            fault = f"must have a largest component between {1 / LARGEST:g} and {LARGEST:g}, got {size:g}"
-            raise CaseError(f"{key}.twist", fault)
-        weight = check_real(task.weight, f"{key}.weight")
-        if not (math.isfinite(weight) and weight > 0):
-            raise CaseError(f"{key}.weight", "must be positive and finite", task.weight)
-        point = None if task.point is None else frozen_array(check_vector(task.point, f"{key}.point"), (3,))
-        _check_measure(case, task)
-        stated = replace(task, twist=frozen_array(twist, (6,)), sense=Sense(task.sense), weight=weight, point=point)
-        tasks.append(stated)
-    names = [task.name for task in tasks]
-    for index, name in enumerate(names):
-        if name in names[:index]:
-            raise CaseError(f"task[{index}].name", "is used by an earlier task; give each task its own name", name)
-    return tuple(tasks)
-
-
-def _check_tolerance(case: Case) -> None:
-    """Refuse a tolerance that is not positive, or that is not supported for the robot.
-
-    Raises:
-        CaseError: the tolerance is not allowed.
-    """
-    tolerance = case.joint_centre_tolerance
-    if tolerance is None:
-        return
-    if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
-        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
-    if case.model.structure and case.workspace is not None:
-        # The workspace is verified for all robots within the tolerance.
-        return
-    if not case.model.built or case.model.unknowns:
-        reason = "add a [workspace] to verify it there" if case.model.structure else "its joint centres are not known"
-        raise CaseError("tolerance.joint_centre", f"is not supported for the robot {case.model.name!r}: {reason}")

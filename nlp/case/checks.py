@@ -227,3 +227,26 @@ def check_determined_joints(model: Model, key: str, source: str | None = None) -
         raise CaseError(
             key, f"{fault}; use a robot file without {'these joints' if several else 'this joint'}", source=source
         )
+
+
+def check_tolerance(tolerance: float | None, model: Model, has_workspace: bool) -> None:
+    """Refuse a tolerance that is not positive, or that is not supported for the robot.
+
+    Args:
+        tolerance: largest manufacturing error of each joint centre, length; None for no tolerance.
+        model: the robot.
+        has_workspace: True if a workspace is verified.
+
+    Raises:
+        CaseError: the tolerance is not allowed.
+    """
+    if tolerance is None:
+        return
+    if not 0 < check_real(tolerance, "tolerance.joint_centre") <= LARGEST:
+        raise CaseError("tolerance.joint_centre", "must be positive and finite", tolerance)
+    if model.structure and has_workspace:
+        # The workspace is verified for all robots within the tolerance.
+        return
+    if not model.built or model.unknowns:
+        reason = "add a [workspace] to verify it there" if model.structure else "its joint centres are not known"
+        raise CaseError("tolerance.joint_centre", f"is not supported for the robot {model.name!r}: {reason}")

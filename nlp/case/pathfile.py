@@ -99,7 +99,7 @@ class PathFile:
             check_value(value, f"path.place.{name}", dimension, units, domain)
         if self.tool is not None:
             check_direction(self.tool.axis, "path.tool.axis")
-            turn = check_value(self.tool.turn, "path.tool.turn", Dimension.ANGLE, units, (-LARGEST_TURN, LARGEST_TURN))
+            turn = check_value(self.tool.turn, "path.tool.turn", Dimension.ANGLE, units, (-math.tau, math.tau))
             if isinstance(turn, Free) and turn.rate is None:
                 raise CaseError("path.tool.turn.rate", MISSING_RATE)
 

@@ -1,14 +1,47 @@
-"""Values and poses that change from task to task: those of one task, and those that all tasks allow."""
+"""Values and poses that change from task to task: those of one task, those that all tasks allow, and all in order."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from ...models import Displacement
 from ..errors import CaseError
 from .pose import PerTask, Pose, Rotation, Value, shared_value
+
+
+class Station(NamedTuple):
+    """Pose of the robot in a case.
+
+    Attributes:
+        task: index of the only task at this pose; None if every task takes it.
+        pose: index of the stated pose.
+        step: displacement from the stated pose.
+    """
+
+    task: int | None
+    pose: int
+    step: Displacement
+
+
+def stations(poses: Sequence[Pose], tasks: int, own_poses: bool) -> tuple[Station, ...]:
+    """Return the poses of the robot in order: those of the first task, then those of the second, and so on.
+
+    Args:
+        poses: stated poses, with their displacements.
+        tasks: number of tasks, each with its own dimensions or poses; 0 if every task takes every pose.
+        own_poses: True if the stated poses belong to the tasks in turn, as many to each task.
+    """
+    placed = [(k, step) for k, pose in enumerate(poses) for step in pose.displacements]
+    if not tasks:
+        return tuple(Station(None, k, step) for k, step in placed)
+    count = len(poses) // tasks
+    return tuple(
+        Station(task, k, step) for task in range(tasks) for k, step in placed if not own_poses or k // count == task
+    )
 
 
 def task_value(value: Value | PerTask, task: int) -> Value:

@@ -8,6 +8,7 @@ from ..output.pictures.figures import figure_of as figure_of
 from ..output.pictures.pathpanels import PathPicture as PathPicture
 from ..output.pictures.pathpanels import path_picture as path_picture
 from ..output.pictures.paths import path_figure as path_figure
+from ..output.pictures.schedules import schedule_figure as schedule_figure
 from ..output.pictures.solutions import drawings_of as drawings_of
 from ..output.pictures.workspaces import drawing_at as drawing_at
 from ..output.pictures.workspaces import slices_figure as slices_figure

@@ -107,11 +107,14 @@ def solve_with_progress(
         CaseError: the case contradicts itself.
         InputError: the objective cannot be compiled.
     """
+    from ..errors import InputError
     from ..solver.solve import solve
 
     if case.limits_over == "workspace":
         tell_workspace(case)
     if step is not None:
+        if case.over_path is not None:
+            raise InputError("--round: is for designs at stated poses; F of this case is optimised along its path")
         from ..solver.rounding import round_design
 
         rounded = round_design(solve_with_progress(case, jobs).solution, step, jobs=jobs)
@@ -119,16 +122,17 @@ def solve_with_progress(
             return SolveOutcome(rounded, rounded, not certify)
         certified = certify_with_progress(rounded, jobs=jobs, gap=gap)
         return SolveOutcome(certified.solution, certified, certified.is_proved)
-    if certify:
+    if certify and case.over_path is None:
         found: Case | Solution = case
         if case.changes:  # the answer also says what each change is worth
             solution = solve_with_progress(case, jobs).solution
             found = solution if solution.status.is_answer else case
         certified = certify_with_progress(found, jobs=jobs, gap=gap)
         return SolveOutcome(certified.solution, certified, certified.is_proved)
+    along = gap if certify else None
     if not sys.stderr.isatty():
-        solution = solve(case, jobs=jobs)
-        return SolveOutcome(solution, solution, True)
+        solution = solve(case, jobs=jobs, gap=along)
+        return SolveOutcome(solution, solution, _is_bounded(solution, along))
     from rich.console import Console
     from rich.markup import escape
     from rich.progress import Progress
@@ -147,8 +151,15 @@ def solve_with_progress(
         def show_phase(phase: Phase, done: int, total: int) -> None:
             bar.update(line, completed=done, total=total, description=phase.value)
 
-        solution = solve(case, jobs=jobs, progress=show, phase=show_phase)
-    return SolveOutcome(solution, solution, True)
+        solution = solve(case, jobs=jobs, progress=show, phase=show_phase, gap=along)
+    return SolveOutcome(solution, solution, _is_bounded(solution, along))
+
+
+def _is_bounded(solution: Solution, gap: float | None) -> bool:
+    """Return whether the bound of all schedules is within a relative gap; true without a gap."""
+    if gap is None or solution.schedule is None:
+        return True
+    return solution.schedule.gap is not None and solution.schedule.gap <= gap
 
 
 def certify_with_progress(case: Case | Solution, **options: Any) -> Certified:  # noqa: ANN401 - the options of `certify`

@@ -30,6 +30,10 @@ def solve(
     ] = None,
     certify: options.Certify = False,
     gap: options.OptimumGap = 1e-4,
+    schedule: Annotated[
+        str | None,
+        options.file("--schedule", "Write the values that change along the path to this file, or - for standard output"),
+    ] = None,
     whole: options.ShowAll = False,
 ) -> None:
     """Optimise F, and show the evidence of the optimum.
@@ -45,7 +49,9 @@ def solve(
     answer_after(Milestone.START)
     given = options.read_changed_case(case, settings, of).file
     loaded = replace(given.case, search=given.case.search.but(starts, seed, compiled=compiled))
-    files = options.Outputs(json=json_file, plot=plot, csv=csv_file)
+    if schedule is not None and loaded.over_path is None:
+        raise InputError("--schedule: the case optimises nothing along a path; it needs over and as in [objective]")
+    files = options.Outputs(json=json_file, plot=plot, csv=csv_file, schedule=schedule)
     options.check_csv(csv_file, table, loaded, at_point=False)
     files.check(given.inputs)
     if step is not None:
@@ -64,5 +70,8 @@ def solve(
         done=solution.status.is_answer and is_proved and solution.keeps_limits,
         json=lambda: result,
         csv=lambda: contents.tables_as_csv(contents.case_tables(loaded, result), table),
-        plot=lambda: contents.figure_of(contents.drawings_of(solution, pose)),
+        plot=lambda: contents.schedule_figure(loaded, solution)
+        if solution.schedule is not None
+        else contents.figure_of(contents.drawings_of(solution, pose)),
+        schedule=lambda: None if solution.schedule is None else solution.schedule.to_csv(),
     )

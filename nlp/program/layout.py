@@ -44,10 +44,11 @@ from ...models import (
 )
 from ...models.instance import length_of, sizes_at
 from ...models.values import dataclass
-from ..case.case import Case, Station
+from ..case.case import Case
 from ..case.choices import check_no_catalogue
 from ..case.limits.constraint import BoundedConstraint, Call, Constraint, PairFamily, Reading, squared
 from ..case.names import name_of_task
+from ..case.pertask import Station
 from ..case.pose import Free, Pose, Value, sizes_of_turn
 from ..case.task import Sense, Task
 from ..errors import CaseError
@@ -152,6 +153,12 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         raise CaseError(
             key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
         )
+    if case.over_path is not None:
+        name = next(iter(case.settings), None)
+        fault = "optimises along the path, but this command takes one pose; use solve"
+        if name is not None:
+            fault = f"{name} changes along the path, but this command takes one robot; use solve, or fix it with --set {name}"
+        raise CaseError("objective.as", fault, case.over_path.value, source=case.source)
     table, model = SymbolTable(), case.model
     owners = _Owners(table)
     parameters = [_add_parameter(case, item, owners) for item in model.parameters]

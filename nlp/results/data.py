@@ -22,6 +22,7 @@ from .parts import HeadData, LimitData, RobotData, VersionsData, ViolationData
 
 if TYPE_CHECKING:
     from .path import PathProofData
+    from .schedule import ScheduleData
     from .workspace import WorkspaceProofData
 
 
@@ -126,6 +127,8 @@ class SolveResult(JsonObject):
         path: proof along the path; absent if no limit covers the path.
         choice: choice among listed values; absent without listed values.
         rounding: rounding of the dimensions; absent if they are not rounded.
+        schedule: values that change along the path, if F is optimised over the path; the robot is then that at the
+            first point of the path. Otherwise absent.
         seed: random seed of the starting points.
         versions: versions of the software.
         seconds: wall time.
@@ -150,6 +153,7 @@ class SolveResult(JsonObject):
     path: Absent["PathProofData"]
     choice: Absent[ChoiceData]
     rounding: Absent[RoundingData]
+    schedule: Absent["ScheduleData"]
     seed: int
     versions: VersionsData
     seconds: float

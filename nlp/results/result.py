@@ -36,8 +36,10 @@ from .point import head_data, objective, robot_data, versions, violations
 
 if TYPE_CHECKING:
     from ..solver.certified import Certified
+    from ..solver.scheduled import Schedule
     from ..solver.semi_infinite import ExchangeProof
     from .path import PathProofData
+    from .schedule import ScheduleData
     from .workspace import WorkspaceProofData
 
 
@@ -49,6 +51,7 @@ def task_result(
     path: ExchangeProof | None = None,
     choice: ChoiceData | None = None,
     rounding: RoundingData | None = None,
+    schedule: Schedule | None = None,
 ) -> SolveResult:
     """Return the result of the program of one task.
 
@@ -60,6 +63,7 @@ def task_result(
         path: proof along the path; None without a proof.
         choice: choice among listed values; None without listed values.
         rounding: rounding of the dimensions; None if they are not rounded.
+        schedule: values that change along the path; None without such values.
     """
     nlp, x, state = solution.nlp, solution.x, solution.state
     answer = solution.status.is_answer
@@ -73,7 +77,7 @@ def task_result(
         solution,
         head=head_data(nlp.case),
         sense=nlp.sense,
-        F=objective(nlp, x, state) if solved else None,
+        F=schedule.value if schedule is not None else objective(nlp, x, state) if solved else None,
         objective=objective_data(nlp.case, value if solved else None, certificate),
         reached=None if answer else ReachedData(F=finite_or_none(nlp.evaluate(x)[0]), violated=violations(nlp, x)),
         relaxation=RelaxedLimit.of_each(solution.relaxation, nlp.case.units) or None,
@@ -89,8 +93,16 @@ def task_result(
         path=None if path is None else _path_data(path),
         choice=choice,
         rounding=rounding,
+        schedule=None if schedule is None else _schedule_data(schedule),
         versions=versions(),
     )
+
+
+def _schedule_data(schedule: Schedule) -> ScheduleData:
+    """Return the schedule of a solve."""
+    from .schedule import schedule_data  # noqa: PLC0415 - few cases have one
+
+    return schedule_data(schedule)
 
 
 def _proof_data(workspace: ExchangeProof) -> WorkspaceProofData | None:
@@ -240,6 +252,7 @@ def result_of(found: Solution | Certified) -> CaseResult:
             solution.path,
             choice_data(solution),
             rounding_data(solution),
+            solution.schedule,
         )
     combined = None if isinstance(found, Solution) else found.combined
     return combined_result(solution, solution.combination, certificates, combined)

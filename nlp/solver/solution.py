@@ -23,6 +23,7 @@ from ..program.nlp import Nlp
 from ..program.relaxation import RelaxedLimit
 from ..system.jsonvalues import Vector
 from .multistart import ProgramSolution
+from .scheduled import Schedule
 from .starts import Optimum, Start
 from .status import Status
 
@@ -252,6 +253,8 @@ class Solution(Whole, Shown, Answer):
         choice: search over listed parameter values; None without listed values.
         rounding: rounding of dimensions; None without rounding.
         changes: for each dimension or pose that changes from task to task, the answer with it shared.
+        schedule: values that change along the path, if the objective is over the path; the point is then the robot at
+            the first point of the path. Otherwise None.
     """
 
     case: Case
@@ -265,6 +268,7 @@ class Solution(Whole, Shown, Answer):
     choice: Choice | None = None
     rounding: Rounding | None = None
     changes: tuple[SharedInstead, ...] = ()
+    schedule: Schedule | None = None
 
     def __repr__(self) -> str:
         if self.combination is None:
@@ -380,6 +384,8 @@ class Solution(Whole, Shown, Answer):
         """
         if self.combination is not None:
             raise EvaluationError("F: a case with several tasks has no single F: see outcomes and combination.value")
+        if self.schedule is not None:
+            return self.schedule.value
         return self.outcomes[0].own.F
 
     @property

@@ -43,6 +43,7 @@ def solve(
     progress: SolveProgress | None = None,
     solver: Solver = ipopt,
     phase: PhaseProgress = no_phase,
+    gap: float | None = None,
 ) -> Solution:
     """Solve a case: its task, or each of several tasks and then their combination by the method of the case.
 
@@ -58,13 +59,23 @@ def solve(
         progress: function to call after each start.
         solver: local solver that searches from each starting point.
         phase: function to call with the phase of the solve and its progress.
+        gap: for a case whose settings change along its path, relative gap to which a bound of all schedules is proved;
+            no bound if left out.
 
     Raises:
-        CaseError: the case contradicts itself, or has several tasks and nothing free.
+        CaseError: the case contradicts itself, or has several tasks and nothing free; or a gap is given without
+            settings.
         InputError: the objective is to be compiled, and there is no C compiler or it fails; limits hold over a
             workspace or along a path, and the C kernel for their proof was not built; or the path cannot be read.
     """
     began = time.perf_counter()
+    if case.over_path is not None:
+        from .schedule.search import solve_schedule  # noqa: PLC0415 - few cases have settings
+
+        own = None if progress is None else partial(progress, case.tasks[0].name)
+        return solve_schedule(case, starts=starts, seed=seed, gap=gap, progress=own)
+    if gap is not None:
+        raise CaseError("objective.as", "is missing: gap is for schedules along a path; use certify", source=case.source)
     solve_once = partial(
         _solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
     )

@@ -73,6 +73,9 @@ def case_summary(case: Case, result: CaseResult) -> Summary:
 
 def _task_summary(case: Case, result: SolveResult) -> Summary:
     """Yield F, the evidence, the design and the active limits of a solve of one task; then the sections behind them."""
+    if case.over_path is not None:
+        yield from _schedule_summary(case, result)
+        return
     robot = result.robot
     yield from heading_lines(case, result)
     yield from choice_lines(result.choice, result.rounding, is_answer=result.F is not None)
@@ -95,6 +98,22 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
         yield solved_design_table(case, result, robot)
     yield from active_limit_lines(result.limits, limits_title(case, result.workspace or result.path))
     yield from _task_parts(case, result)
+
+
+def _schedule_summary(case: Case, result: SolveResult) -> Summary:
+    """Yield the objective over the path with its bound, the settings and the design; then the schedule."""
+    from .schedule import no_schedule_line, schedule_lines, schedule_table  # noqa: PLC0415 - few cases have one
+
+    yield title_line(case)
+    for task in case.tasks:
+        if task.is_stated:
+            yield Line(f"{task.name}, {task.sense.value} F: {task.follows or 'stated motion'}", label="task")
+    if result.schedule is None:
+        yield no_schedule_line(case)
+        return
+    yield from schedule_lines(case, result.schedule)
+    if result.schedule.names:
+        yield schedule_table(result.schedule)
 
 
 def _task_parts(case: Case, result: SolveResult) -> Summary:

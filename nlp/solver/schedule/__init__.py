@@ -1,0 +1,1 @@
+"""Schedules: settings of a robot that change along its tool path, found by dynamic programming and Ipopt."""

@@ -1,0 +1,156 @@
+"""Ipopt near a schedule: settings at all points, or one constant, together with the free dimensions of the design.
+
+With its usual barrier Ipopt leaves the ridge on which it begins. The small barrier and distances from bounds keep it
+there. A largest worst value leaves most of the schedule open, so the mean is maximised next, at this level.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import MX
+
+from ....models import FloatArray
+from .problem import INSIDE, ScheduleProblem, ends
+
+#: Barrier and distances from bounds at which Ipopt begins, and its tolerance.
+_BARRIER, _NEAR, _TOLERANCE = 1e-7, 1e-9, 1e-9
+#: Largest number of iterations.
+_ITERATIONS = 300
+#: Part of the level that the second search may lose.
+_LOSS = 1e-7
+
+
+class Polished(NamedTuple):
+    """Design (n,), settings (N, k) and signed objective after a local search."""
+
+    d: FloatArray
+    s: FloatArray
+    value: float
+
+
+def polish(
+    problem: ScheduleProblem,
+    d: FloatArray,
+    s: FloatArray,
+    *,
+    constant: bool = False,
+    near: bool = True,
+    iterations: int = _ITERATIONS,
+) -> Polished | None:
+    """Return the local optimum near a design and a schedule; None if none was found that keeps the limits.
+
+    Args:
+        problem: the problem.
+        d: (n,) design.
+        s: (N, k) schedule.
+        constant: If true, settings are the same at all points.
+        near: If true, the search stays near its start.
+        iterations: largest number of iterations.
+    """
+    if problem.is_worst:
+        level = _search(problem, d, s, constant=constant, near=near, iterations=iterations, goal="level")
+        if level is None or constant:
+            return level
+        least = level.value - _LOSS * abs(level.value)
+        again = _search(
+            problem, level.d, level.s, constant=False, near=True, iterations=iterations, goal="", at_least=least
+        )
+        return level if again is None or again.value < least - _LOSS * abs(level.value) else again
+    return _search(problem, d, s, constant=constant, near=near, iterations=iterations, goal="")
+
+
+def _search(
+    problem: ScheduleProblem,
+    d: FloatArray,
+    s: FloatArray,
+    *,
+    constant: bool,
+    near: bool,
+    iterations: int,
+    goal: str,
+    at_least: float | None = None,
+) -> Polished | None:
+    """Return the result of one search for the largest level or the largest mean; see :func:`polish`."""
+    count, k = s.shape
+    n = len(d)
+    rows = 1 if constant else count
+    centre, half = _scales(problem)
+    x = MX.sym("x", n + rows * k + (goal == "level"))
+    design = ca.DM(centre[:n]) + ca.DM(half[:n]) * x[:n] if n else MX(0, 1)
+    own = ca.reshape(x[n : n + rows * k], k, rows)
+    own = ca.repmat(ca.DM(centre[n:]), 1, rows) + ca.repmat(ca.DM(half[n:]), 1, rows) * own
+    S = ca.repmat(own, 1, count) if constant else own
+    values, limits = problem.function.map(count)(ca.repmat(design, 1, count), S, problem.numbers)
+    T = values.shape[0]
+    weighted = values * ca.repmat(ca.DM(problem.weights), 1, count)
+    mean = ca.dot(ca.sum1(weighted).T, ca.DM(problem.points.weights))
+    start = problem.at(d, s).objective
+    size = float(np.abs(problem.combined(start)).mean()) or 1.0
+    g, low, high = [ca.vec(limits)], [-math.inf] * limits.numel(), [0.0] * limits.numel()
+    if problem.of_design.numel():
+        g.append(ca.Function("own", [problem.symbols[0]], [problem.of_design])(design))
+        low, high = low + [-math.inf] * problem.of_design.numel(), high + [0.0] * problem.of_design.numel()
+    if rows > 1:
+        for j in range(k):
+            steps = problem.steps[:, j] * (1 - INSIDE) / half[n + j]
+            limited = np.flatnonzero(np.isfinite(steps)).tolist()
+            row = x[n + j : n + rows * k : k]
+            g.append((row[1:] - row[:-1])[limited])
+            low, high = low + (-steps[limited]).tolist(), high + steps[limited].tolist()
+            if problem.is_periodic:
+                g.append(row[-1] - row[0])
+                low, high = [*low, 0.0], [*high, 0.0]
+    x0 = np.concatenate([(d - centre[:n]) / half[:n], ((s[:rows] - centre[n:]) / half[n:]).ravel()])
+    lbx, ubx = -np.ones(len(x0)), np.ones(len(x0))
+    if goal == "level":
+        worst = problem.combined(start).min()
+        x0, lbx, ubx = np.append(x0, worst / size), np.append(lbx, -math.inf), np.append(ubx, math.inf)
+        g.append(ca.vec(weighted) / size - x[-1])
+        low, high = low + [0.0] * (T * count), high + [math.inf] * (T * count)
+        objective = -x[-1]
+    else:
+        objective = -mean / size
+        if at_least is not None:
+            g.append(ca.vec(weighted) / size)
+            low, high = low + [at_least / size] * (T * count), high + [math.inf] * (T * count)
+    solver = ca.nlpsol("schedule", "ipopt", {"x": x, "f": objective, "g": ca.vertcat(*g)}, _options(near, iterations))
+    found = solver(x0=np.clip(x0, lbx, ubx), lbx=lbx, ubx=ubx, lbg=low, ubg=high)
+    point = found["x"].full().ravel()[: n + rows * k]
+    point = np.clip(point, -1.0, 1.0)
+    new = centre[:n] + half[:n] * point[:n], centre[n:] + half[n:] * point[n:].reshape(rows, k)
+    low_d, high_d, _ = ends(problem.design)
+    low_s, high_s, _ = ends(problem.settings)
+    d_new, s_new = np.clip(new[0], low_d, high_d), np.clip(new[1], low_s, high_s)
+    s_new = np.repeat(s_new, count, axis=0) if constant else within_rates(problem, s_new)
+    if not problem.is_feasible(d_new, s_new):
+        return None
+    return Polished(d_new, s_new, problem.value(d_new, s_new))
+
+
+def within_rates(problem: ScheduleProblem, s: FloatArray) -> FloatArray:
+    """Return a schedule (N, k) whose steps are within the rates, after steps that exceed them by rounding."""
+    found, limits = s.copy(), problem.steps * (1 - 0.5 * INSIDE)
+    if (np.abs(np.diff(s, axis=0)) <= limits).all():
+        return found
+    for i in range(1, len(s)):
+        found[i] = np.clip(s[i], found[i - 1] - limits[i - 1], found[i - 1] + limits[i - 1])
+    return found
+
+
+def _scales(problem: ScheduleProblem) -> tuple[FloatArray, FloatArray]:
+    """Return the middles and half widths of the ranges of design and settings."""
+    low, high, _ = ends([*problem.design, *problem.settings])
+    return 0.5 * (low + high), 0.5 * (high - low)
+
+
+def _options(near: bool, iterations: int) -> dict[str, Any]:
+    """Return the options of Ipopt."""
+    own: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": iterations, "tol": _TOLERANCE}
+    if near:
+        pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+        own |= {"mu_init": _BARRIER, **dict.fromkeys(pushes, _NEAR)}
+    return {"print_time": False, "ipopt": own}

@@ -1,0 +1,313 @@
+"""Schedule problem: F and limits at each point of a path, as one function of design, settings and the point.
+
+    maximise  sum_i w_i sum_j F_j(d, s_i, point_i)   or   min_ij F_j(d, s_i, point_i)
+
+over the design d and the settings s_i at N points, within limits at each point and ``|s_(i+1) - s_i| <= rate dt_i``. F
+is negative for a minimum. The function is mapped over the points, so its expressions do not grow with the path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from operator import attrgetter
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+from casadi import SX
+
+from ....models import Dimension, FloatArray, RobotInstance, Substitution, instantiate
+from ....models.joints.model.closedform import closed_form
+from ....models.rotation import matrix_from_axis_angle
+from ....models.values import dataclass
+from ...case.case import Case
+from ...case.choices import check_no_catalogue
+from ...case.limits.constraint import BoundedConstraint
+from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ...case.pathfile import TURN
+from ...case.pose import Free, OverPoses
+from ...case.task import LEG_LENGTH, Task
+from ...errors import CaseError
+from ...path.reader import path_of_case
+from ...path.waypoints import Waypoints, waypoints
+from ...program.layout import reference_of
+
+#: Numbers of a point: position, rotation matrix column by column, unit vector of the feed.
+_POINT = 15
+#: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
+INSIDE = 1e-9
+
+
+class Variable(NamedTuple):
+    """Free value of a schedule problem: a dimension of the design, or a setting.
+
+    Attributes:
+        name: name in the case, or ``turn``.
+        dimension: physical dimension.
+        lower, upper, first: bounds, and value at the first starting point.
+        rate: largest change per second of a setting; None for the design.
+    """
+
+    name: str
+    dimension: Dimension
+    lower: float
+    upper: float
+    first: float
+    rate: float | None = None
+
+
+class Values(NamedTuple):
+    """Values at points of the path.
+
+    Attributes:
+        objective: (N, T) signed F of each task, or negative leg lengths.
+        excess: (N, c) amounts by which limits are exceeded, relative to their sizes; negative within a limit.
+    """
+
+    objective: FloatArray
+    excess: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ScheduleProblem:
+    """Design and schedule of a case along its path.
+
+    Attributes:
+        case: the case.
+        points: points of the path.
+        design, settings: free values of the design, and settings.
+        weights: (T,) weight of each objective at a point.
+        symbols: symbols ``d``, ``s`` and of the numbers of a point.
+        objective: (T, 1) signed objectives.
+        limits: (c, 1) limits as expressions that must be at most 0.
+        of_design: (b, 1) limits of the design alone, at most 0.
+        names: names of the limits.
+    """
+
+    case: Case
+    points: Waypoints
+    design: tuple[Variable, ...]
+    settings: tuple[Variable, ...]
+    weights: FloatArray
+    symbols: tuple[SX, SX, SX]
+    objective: SX
+    limits: SX
+    of_design: SX
+    names: tuple[str, ...]
+
+    @property
+    def sign(self) -> float:
+        """1 for a maximum, -1 for a minimum."""
+        return self.case.tasks[0].sense.sign
+
+    @property
+    def is_worst(self) -> bool:
+        """True if the worst value over the points is optimised, false for the mean."""
+        return self.case.over_path is OverPoses.WORST
+
+    @property
+    def is_periodic(self) -> bool:
+        """True if settings are equal at the first and the last point."""
+        return self.case.path is not None and self.case.path.periodic
+
+    @cached_property
+    def numbers(self) -> FloatArray:
+        """Numbers (m, N) of the points."""
+        points = self.points
+        rotations = points.rotations.transpose(0, 2, 1).reshape(len(points), 9)
+        return np.ascontiguousarray(np.hstack([points.positions, rotations, points.feeds]).T)
+
+    @cached_property
+    def steps(self) -> FloatArray:
+        """Largest change (N - 1, k) of each setting from each point to the next; infinite without a rate."""
+        rates = np.array([each.rate for each in self.settings], dtype=np.float64)
+        found = np.full((len(self.points) - 1, len(rates)), math.inf)
+        for k, rate in enumerate(rates):
+            if math.isfinite(rate):
+                found[:, k] = rate * self.points.seconds
+        return found
+
+    @cached_property
+    def function(self) -> ca.Function:
+        """Function of design, settings and the numbers of a point, with objectives and limits."""
+        return ca.Function("point", list(self.symbols), [ca.densify(self.objective), ca.densify(self.limits)])
+
+    def at(self, d: FloatArray, s: FloatArray, which: Sequence[int] | None = None) -> Values:
+        """Return the values for a design (n,) and settings (N, k) at the points, or at some of the points."""
+        numbers = self.numbers if which is None else self.numbers[:, list(which)]
+        count = numbers.shape[1]
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        objective, limits = self.function.map(count)(design, np.reshape(s, (count, -1)).T, numbers)
+        return Values(objective.full().T, limits.full().T)
+
+    def combined(self, objective: FloatArray) -> FloatArray:
+        """Return the value of each point from the objectives (..., T) of its tasks: their sum, or the worst."""
+        weighted = objective * self.weights
+        return np.asarray(weighted.min(axis=-1) if self.is_worst else weighted.sum(axis=-1))
+
+    def value(self, d: FloatArray, s: FloatArray) -> float:
+        """Return the signed objective of a design (n,) and a schedule (N, k)."""
+        per_point = self.combined(self.at(d, s).objective)
+        return float(per_point.min()) if self.is_worst else math.fsum((self.points.weights * per_point).tolist())
+
+    def is_feasible(self, d: FloatArray, s: FloatArray, slack: float = 1e-7) -> bool:
+        """Return whether a schedule keeps all limits, its ranges and its rates, up to a relative slack."""
+        values = self.at(d, s)
+        low, high, _ = ends(self.settings)
+        steps = np.abs(np.diff(s, axis=0)) - self.steps * (1 + slack)
+        own = ca.Function("own", [self.symbols[0]], [self.of_design])(d).full()
+        return bool(
+            np.isfinite(values.objective).all()
+            and (values.excess <= slack).all()
+            and (own <= slack).all()
+            and (s >= low - slack).all()
+            and (s <= high + slack).all()
+            and (steps <= slack * (high - low)).all()
+        )
+
+
+def ends(variables: Sequence[Variable]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return lower bounds, upper bounds and first values (n,) of variables."""
+    rows = [(each.lower, each.upper, each.first) for each in variables]
+    low, high, first = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    return low, high, first
+
+
+def schedule_problem(case: Case) -> ScheduleProblem:
+    """Return the schedule problem of a case.
+
+    Args:
+        case: case with an objective over its path.
+
+    Raises:
+        CaseError: a limit, a direction or the robot is not supported along a path, or a rate needs times of the path.
+        InputError: the path cannot be read.
+    """
+    check_no_catalogue(case)
+    case.require_motion()
+    points = waypoints(path_of_case(case))
+    _check_times(case, points)
+    closed = closed_form(case.model)
+    model = closed.model
+    if model.unknowns:
+        fault = (
+            f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
+        )
+        raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
+    design, settings, parameters, d, s = _variables(case)
+    point = SX.sym("point", _POINT)
+    position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
+    turned, axis = rotation, SX([0.0, 0.0, 1.0])
+    if case.path is not None and case.path.tool is not None:
+        local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
+        axis = rotation @ SX(local.tolist())
+        turn = case.path.tool.turn
+        angle = s[[each.name for each in settings].index(TURN)] if isinstance(turn, Free) else SX(turn)
+        turned = rotation @ matrix_from_axis_angle(SX(local.tolist()), angle)
+    substitution = Substitution(parameters, SX(0, 1), turned, position, reference_of(case))
+    twists = [_twist(task, position, feed, axis) for task in case.tasks]
+    length = SX(case.characteristic_length)
+    robot = instantiate(model, substitution, length, twists)
+    stated = [
+        (item.constraint.name, item.constraint.expression, item.lower, item.upper)
+        for item in _limits(case, robot, parameters)
+    ]
+    for reach in closed.reaches:
+        value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
+        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf))
+    rows = [row for each in stated for row in _rows(*each)]
+    varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
+    at_points = [row for row, own in zip(rows, varying, strict=True) if own]
+    lengths = case.tasks[0].measure == LEG_LENGTH
+    values = ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs]) if lengths else robot.F
+    if lengths and not robot.legs:
+        raise CaseError("objective.minimise", f"needs legs, but {case.model.name!r} has none", LEG_LENGTH)
+    weights = [1.0] * values.numel() if lengths else [task.weight for task in case.tasks]
+    return ScheduleProblem(
+        case=case,
+        points=points,
+        design=design,
+        settings=settings,
+        weights=np.array(weights),
+        symbols=(d, s, point),
+        objective=case.tasks[0].sense.sign * values,
+        limits=ca.vertcat(SX(0, 1), *[row for _, row in at_points]),
+        of_design=ca.vertcat(SX(0, 1), *[row for (_, row), own in zip(rows, varying, strict=True) if not own]),
+        names=tuple(name for name, _ in at_points),
+    )
+
+
+def _check_times(case: Case, points: Waypoints) -> None:
+    """Refuse a finite rate along a path with a segment without a time."""
+    limited = [name for name, value in case.settings.items() if value.rate is not None and math.isfinite(value.rate)]
+    untimed = np.flatnonzero(~np.isfinite(points.seconds))
+    if limited and len(untimed):
+        fault = f"needs the time of every segment, which the path does not state; give {limited[0]} the rate inf,"
+        raise CaseError(f"{limited[0]}.rate", f"{fault} or state t or feed in the path", source=case.source)
+
+
+def _variables(case: Case) -> tuple[tuple[Variable, ...], tuple[Variable, ...], SX, SX, SX]:
+    """Return design, settings, the parameters (n, 1) of the robot as expressions, and symbols of both."""
+    design: list[Variable] = []
+    settings: list[Variable] = []
+    places: list[tuple[str, float | int]] = []
+    for item in case.model.parameters:
+        names = case.component_names(item)
+        for name, value in zip(names, case.components(item.name), strict=True):
+            if not isinstance(value, Free):
+                places.append(("", float(value)))
+                continue
+            if item.is_direction:
+                raise CaseError(f"robot.parameters.{item.name}", "must be fixed with objective.as: it is a direction")
+            found = Variable(name, item.dimension, value.lower, value.upper, value.first, value.rate)
+            into, kind = (design, "d") if value.rate is None else (settings, "s")
+            places.append((kind, len(into)))
+            into.append(found)
+    turn = case.settings.get(TURN)
+    if turn is not None:
+        settings.append(Variable(TURN, Dimension.ANGLE, turn.lower, turn.upper, turn.first, turn.rate))
+    d, s = SX.sym("d", len(design)), SX.sym("s", len(settings))
+    symbols = {"d": d, "s": s}
+    parts = [symbols[kind][int(place)] if kind else SX(place) for kind, place in places]
+    return tuple(design), tuple(settings), ca.vertcat(SX(0, 1), *parts), d, s
+
+
+def _twist(task: Task, position: SX, feed: SX, axis: SX) -> SX:
+    """Return the twist (6, 1) of a task at a point."""
+    if task.follows == "feed":
+        return ca.vertcat(SX.zeros(3), feed)
+    if task.follows == "thrust":
+        return ca.vertcat(SX.zeros(3), axis)
+    if task.follows == "tool":
+        return ca.vertcat(axis, ca.cross(position, axis))
+    return SX([float(part) for part in np.asarray(task.twist)])
+
+
+def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedConstraint]:
+    """Return the limits of a case at one point."""
+    stated = [*case.position, case.rotation.angle]
+    numbers = ca.vertsplit(ca.vertcat(parameters, *[SX(float(each)) for each in stated])) if case.limits else []  # type: ignore[arg-type]
+    design = Design(case.as_limited, (robot,), dict(zip(case.scalars, numbers, strict=False)))
+    pose = PosedRobot(case.model, robot, tuple(task.name for task in case.tasks), "", case.loading)
+    plates = [
+        Plate("base", tuple(PlateJoint(leg.name, leg.base) for leg in robot.legs)),
+        Plate("platform", tuple(PlateJoint(leg.name, leg.platform) for leg in robot.legs)),
+    ]
+    found: list[BoundedConstraint] = []
+    for limit in sorted(case.limits, key=attrgetter("order")):
+        if list(limit.on_pairs(Design(case.as_limited, (robot, robot), design.numbers))):
+            fault = "compares two poses, which is not supported with objective.as"
+            raise CaseError(f"limits.{limit.name}", fault, source=case.source)
+        found += [item for plate in plates for item in limit.on_plate(plate)]
+        found += [*limit.of_design(design), *limit.at_pose(pose)]
+    return found
+
+
+def _rows(name: str, expression: SX, lower: float, upper: float) -> Iterator[tuple[str, SX]]:
+    """Yield one-sided rows ``row <= 0`` of a constraint, relative to the size of the bound."""
+    if math.isfinite(upper):
+        yield name, (expression - upper) / (abs(upper) or 1.0)
+    if math.isfinite(lower):
+        yield name, (lower - expression) / (abs(lower) or 1.0)

@@ -1,0 +1,216 @@
+"""Search for the best design and schedule of a case, with the best constant setting beside it.
+
+Dynamic programming gives a schedule for each of several designs, and Ipopt moves design and schedule together from
+there. The best one is searched once more on a finer grid.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ....models import FloatArray
+from ....models.rotation import axis_angle_from_matrix
+from ...case.case import Case
+from ...case.pathfile import TURN
+from ...case.pose import Free, OverPoses, Rotation
+from ...case.settings import Search
+from ...case.task import LEG_LENGTH, Sense, Task
+from ...interruption import is_requested
+from ...path.path import Poses
+from ...program.formulation import formulate
+from ..compromise import solution_of_one_task
+from ..multistart import solve_program
+from ..scheduled import ConstantSetting, Schedule
+from ..solution import Solution
+from ..status import Status
+from .cells import cell_bound, check_certified
+from .dynamic import constants, seeds
+from .polish import Polished, polish
+from .problem import ScheduleProblem, ends, schedule_problem
+
+#: Largest number of designs from which the search begins.
+_DESIGNS = 12
+
+#: Function to call after each design, with the number of designs done, the number of all, and the best objective so far.
+DesignProgress = Callable[[int, int, float | None], None]
+
+
+def solve_schedule(
+    case: Case,
+    *,
+    starts: int | None = None,
+    seed: int | None = None,
+    gap: float | None = None,
+    progress: DesignProgress | None = None,
+) -> Solution:
+    """Return the best design and schedule found for a case with an objective over its path.
+
+    The point of the solution is the robot at the first point of the path.
+
+    Args:
+        case: the case.
+        starts: number of designs from which the search begins; the case's number, at most 12, if left out.
+        seed: seed of these designs; the case's seed if left out.
+        gap: relative gap to which a bound of all schedules is proved; None for no bound.
+        progress: function to call after each design.
+
+    Raises:
+        CaseError: the case is not supported along a path, or the bound has more than one setting.
+        InputError: the path cannot be read.
+    """
+    began = time.perf_counter()
+    problem = schedule_problem(case)
+    if gap is not None:
+        check_certified(problem)
+    search = case.search.but(starts, seed)
+    designs = _designs(problem, search)
+    found: list[Polished] = []
+    fixed: list[Polished] = []
+    for done, d in enumerate(designs):
+        if is_requested() and found:
+            break
+        coarse = len(designs) > 1
+        held = _constants(problem, d, fine=not coarse)
+        fixed += held
+        found += [*held, *_schedules(problem, d, held, fine=not coarse)]
+        if progress is not None:
+            best = max((each.value for each in found), default=None)
+            progress(done + 1, len(designs), None if best is None else problem.sign * best)
+    if not found:
+        return _solution(problem, None, None, None, began, search)
+    best = max(found, key=lambda each: each.value)
+    if len(designs) > 1:
+        constant = max(fixed, key=lambda each: each.value, default=None)
+        found += _schedules(problem, best.d, [] if constant is None else [constant], fine=True)
+        best = max(found, key=lambda each: each.value)
+    constant = max(fixed, key=lambda each: each.value, default=None)
+    bound = None if gap is None else cell_bound(problem, best.d, best.value, gap).bound
+    return _solution(problem, best, constant, bound, began, search)
+
+
+def _designs(problem: ScheduleProblem, search: Search) -> list[FloatArray]:
+    """Return the designs (n,) from which the search begins: the first values, then random ones."""
+    low, high, first = ends(problem.design)
+    if not len(first):
+        return [first]
+    rng = np.random.default_rng(search.seed)
+    count = min(search.starts, _DESIGNS)
+    return [first, *(rng.uniform(low, high) for _ in range(count - 1))]
+
+
+def _constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool) -> list[Polished]:
+    """Return the best constant settings near the best ones of a grid, with the design moved too."""
+    count = len(problem.points)
+    found = []
+    for s in constants(problem, d, fine=fine):
+        start = np.repeat(np.reshape(s, (1, -1)), count, axis=0)
+        found.append(polish(problem, d, start, constant=True, near=False))
+    kept = [each for each in found if each is not None]
+    return [max(kept, key=lambda each: each.value)] if kept else []
+
+
+def _schedules(problem: ScheduleProblem, d: FloatArray, held: list[Polished], *, fine: bool) -> list[Polished]:
+    """Return the schedules near those of dynamic programming, and near the best constant."""
+    if not problem.settings:
+        return []
+    constant = held[0].s[0] if held else ends(problem.settings)[2]
+    starts = [(d, s) for s in seeds(problem, d, constant, fine=fine)]
+    starts += [(each.d, each.s) for each in held]
+    found = [polish(problem, *start) for start in starts]
+    return [each for each in found if each is not None]
+
+
+def _solution(
+    problem: ScheduleProblem,
+    best: Polished | None,
+    constant: Polished | None,
+    bound: float | None,
+    began: float,
+    search: Search,
+) -> Solution:
+    """Return the solution: the robot at the first point of the path, with its schedule."""
+    case, sign = problem.case, problem.sign
+    d, s = (ends(problem.design)[2], ends(problem.settings)[2]) if best is None else (best.d, best.s[0])
+    start = at_first_point(problem, d, s)
+    own = solve_program(formulate(start), replace(search, starts=1), jobs=1)
+    status = Status.INFEASIBLE if best is None else Status.LOCAL
+    seconds = time.perf_counter() - began
+    own = replace(own, status=status, seconds=seconds)
+    found = replace(solution_of_one_task(start, own), case=case, status=status, seconds=seconds)
+    if best is None:
+        return found
+    units = case.units
+    unit = np.array([units.shown(1.0, each.dimension) for each in problem.settings])
+    held = None if constant is None else ConstantSetting(constant.s[0] * unit, sign * constant.value)
+    schedule = Schedule(
+        names=tuple(each.name for each in problem.settings),
+        dimensions=tuple(each.dimension for each in problem.settings),
+        units=units,
+        values=best.s * unit,
+        times=problem.points.times,
+        poses=Poses(problem.points.positions, problem.points.rotations),
+        F=sign * problem.combined(problem.at(best.d, best.s).objective),
+        over=case.over_path or OverPoses.MEAN,
+        value=sign * best.value,
+        constant=held,
+        rates=np.array([each.rate for each in problem.settings], dtype=np.float64) * unit,
+        design={each.name: units.shown(value, each.dimension) for each, value in zip(problem.design, best.d.tolist(), strict=True)},
+        bound=None if bound is None else sign * bound,
+        sign=sign,
+        seconds=seconds,
+    )
+    return replace(found, schedule=schedule)
+
+
+def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Case:
+    """Return the case of the robot at the first point of the path: fixed design, setting, pose and motion.
+
+    Args:
+        problem: the problem.
+        d: (n,) design.
+        s: (k,) settings at the point.
+    """
+    case, points = problem.case, problem.points
+    values = {each.name: float(value) for each, value in zip((*problem.design, *problem.settings), (*d, *s), strict=True)}
+    parameters = {
+        item.name: [
+            values[name] if isinstance(value, Free) else value
+            for name, value in zip(case.component_names(item), case.components(item.name), strict=True)
+        ]
+        for item in case.model.parameters
+    }
+    rotation, axis = points.rotations[0], np.array([0.0, 0.0, 1.0])
+    if case.path is not None and case.path.tool is not None:
+        local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
+        turn = case.path.tool.turn
+        axis = rotation @ local
+        rotation = rotation @ _turned(local, values[TURN] if isinstance(turn, Free) else float(turn))
+    task = case.tasks[0]
+    p = points.positions[0]
+    twists = {"feed": (0.0, 0.0, 0.0, *points.feeds[0]), "thrust": (0.0, 0.0, 0.0, *axis), "tool": (*axis, *np.cross(p, axis))}
+    if task.measure == LEG_LENGTH:
+        task = Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False)
+    elif task.follows:
+        task = replace(task, twist=twists[task.follows], follows="")
+    return replace(
+        case,
+        parameters=parameters,
+        position=tuple(p.tolist()),
+        rotation=Rotation(*axis_angle_from_matrix(rotation)),
+        tasks=(task,),
+        path=None,
+        over_path=None,
+        method=Case.method,
+    )
+
+
+def _turned(axis: FloatArray, angle: float) -> FloatArray:
+    """Return the rotation matrix (3, 3) of an angle about a unit axis (3,)."""
+    x, y, z = axis.tolist()
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)

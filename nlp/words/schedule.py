@@ -1,0 +1,96 @@
+"""Lines about a schedule: its objective beside that of the best constant, its rates, and the bound of all schedules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ..case.pose import OverPoses
+from ..case.task import LEG_LENGTH
+from .numbers import number
+from .text import Line, TextTable, Tone
+
+if TYPE_CHECKING:
+    from ..case.case import Case
+    from ..results.schedule import ScheduleData
+
+
+def objective_name(case: Case) -> str:
+    """Return the name of the objective over the path."""
+    if case.tasks[0].measure == LEG_LENGTH:
+        return "longest leg"
+    return "mean F" if case.over_path is OverPoses.MEAN else "worst F"
+
+
+def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTable]:
+    """Yield the objective with its gain over the best constant, the bound, and the rates."""
+    name, segments = objective_name(case), schedule.segments
+    where = f"along {segments:,} segment{'s' * (segments != 1)}"
+    unit = f" {case.units.length}" if case.tasks[0].measure == LEG_LENGTH else ""
+    yield Line(f"{name} = {number(schedule.value)}{unit}", tone=Tone.ANSWER, after=f" {where} ({_gain(schedule)})")
+    yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
+    if schedule.bound is not None and schedule.gap is not None:
+        words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"
+        yield Line(words, label="bound", tone=Tone.HOLDS)
+    rows: list[tuple[str | Line, ...]] = []
+    for k, (each, unit) in enumerate(zip(schedule.names, schedule.units, strict=True)):
+        column = [row[k] for row in schedule.rows]
+        rate = schedule.rates[k]
+        rows.append(
+            (
+                each,
+                unit,
+                number(min(column)),
+                number(max(column)),
+                "" if schedule.constant is None else number(schedule.constant.values[k]),
+                "" if rate.used is None else number(rate.used),
+                "inf" if rate.max is None else number(rate.max),
+            )
+        )
+    if rows:
+        head = ("setting", "unit", "smallest", "largest", "best constant", "rate", "largest rate")
+        yield TextTable(head, tuple(rows), "settings")
+    if schedule.design:
+        design = tuple((name, number(value)) for name, value in schedule.design.items())
+        yield TextTable(("dimension", "value"), design, "design")
+
+
+def schedule_table(schedule: ScheduleData) -> TextTable:
+    """Return the settings and the objective at each point of the path."""
+    heads = ("t\ns",) if schedule.times is not None else ()
+    heads += tuple(f"{name}\n{unit}" for name, unit in zip(schedule.names, schedule.units, strict=True))
+    rows = [
+        (
+            *(() if schedule.times is None else (number(schedule.times[i]),)),
+            *(number(value) for value in row),
+            number(schedule.F[i]),
+        )
+        for i, row in enumerate(schedule.rows)
+    ]
+    return TextTable((*heads, "objective"), tuple(rows), "schedule", "schedule", is_curve=True, part="schedule")
+
+
+def no_schedule_line(case: Case) -> Line:
+    """Return the outcome of a search without an answer."""
+    names = ", ".join(case.settings) or "design"
+    words = f"infeasible: no schedule of {names} within the limits and rates was found"
+    return Line(words, tone=Tone.NO_ANSWER)
+
+
+def _gain(schedule: ScheduleData) -> str:
+    """Return the best constant and the gain over it, in words."""
+    constant = schedule.constant
+    if not schedule.names:
+        return "no setting changes"
+    names = ", ".join(schedule.names)
+    if constant is None:
+        return f"no constant {names} keeps the limits"
+    if constant.gain == 0:
+        return f"best constant {names} {number(constant.value)}, no gain"
+    return f"best constant {names} {number(constant.value)}, {_signed(schedule, constant.gain)}"
+
+
+def _signed(schedule: ScheduleData, gain: float) -> str:
+    """Return a gain in per cent, with the sign of the change of the objective."""
+    change = gain if schedule.constant is None or schedule.value >= schedule.constant.value else -gain
+    return f"{100 * change:+.2f} %"
