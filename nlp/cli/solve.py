@@ -32,7 +32,9 @@ def solve(
     gap: options.OptimumGap = 1e-4,
     schedule: Annotated[
         str | None,
-        options.file("--schedule", "Write the values that change along the path to this file, or - for standard output"),
+        options.file(
+            "--schedule", "Write the values that change along the path to this file, or - for standard output"
+        ),
     ] = None,
     whole: options.ShowAll = False,
 ) -> None:
@@ -70,8 +72,10 @@ def solve(
         done=solution.status.is_answer and is_proved and solution.keeps_limits,
         json=lambda: result,
         csv=lambda: contents.tables_as_csv(contents.case_tables(loaded, result), table),
-        plot=lambda: contents.schedule_figure(loaded, solution)
-        if solution.schedule is not None
-        else contents.figure_of(contents.drawings_of(solution, pose)),
+        plot=lambda: (
+            contents.schedule_figure(loaded, solution)
+            if solution.schedule is not None
+            else contents.figure_of(contents.drawings_of(solution, pose))
+        ),
         schedule=lambda: None if solution.schedule is None else solution.schedule.to_csv(),
     )

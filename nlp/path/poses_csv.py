@@ -22,6 +22,9 @@ from .path import Kind, ProgrammedPath
 from .settings import UNCHANGED, Changing, Settings, ToolTurn
 from .standing import duration_at, rest_length, turns_between, without_rests
 
+#: Advice for a dimension whose drive is of interest.
+_JOINTS = "give the robot joint by joint for that"
+
 
 class _Set(TypedDict, total=False):
     """Fields of a path with the tool's turn, the settings, and sentences about unused columns."""
@@ -91,13 +94,9 @@ def _settings(table: NumberTable, changing: Changing, units: Units) -> _Set:
         InputError: a value is out of its range, or changes too fast.
     """
     values = changing.values_of(table, units)
-    found = _Set(
-        warnings=tuple(
-            f"column {name}: not used, because the case fixes {name}"
-            for name in table.columns
-            if name in changing.fixed
-        )
-    )
+    unused = [f"column {name}: not used" for name in table.columns if name in changing.fixed]
+    drives = [f"F locks {name}; its drive has no force or power here: {_JOINTS}" for name in changing.own]
+    found = _Set(warnings=(*unused, *drives))
     if changing.axis is not None:
         found["tool"] = ToolTurn(changing.axis, values.get(TURN, np.full(len(table.rows), changing.turn)))
     if changing.own:

@@ -143,13 +143,27 @@ def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
     return placed(path, fixed)
 
 
-def stated_path(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the tool path of a case, in its frame; arguments and errors are those of :func:`path_of_case`."""
+def path_without_settings(case: Case) -> ProgrammedPath:
+    """Return the tool path of a case before its settings are known; errors are those of :func:`path_of_case`."""
+    return in_place_of_case(stated_path(case, changing=changing_of(case).unread), case)
+
+
+def stated_path(case: Case, options: PathOptions | None = None, changing: Changing | None = None) -> ProgrammedPath:
+    """Return the tool path of a case, in its frame.
+
+    Args:
+        case: the case.
+        options: options that replace those of the case.
+        changing: quantities that change along the path; those of the case if left out.
+
+    Raises:
+        CaseError, InputError: as :func:`path_of_case`.
+    """
     stated = case.path
     if stated is None:
         raise CaseError("path", "is missing: give the table [path], or the file of a path", source=case.source)
     # Messages name the file with its whole path; results use the stated name.
-    path = read_path(stated.name, case.units, options or options_of(stated), changing_of(case))
+    path = read_path(stated.name, case.units, options or options_of(stated), changing or changing_of(case))
     return replace(path, source=stated.file)
 
 

@@ -93,6 +93,11 @@ class Changing:
     dimensions: Mapping[str, Dimension]
     fixed: tuple[str, ...]
 
+    @property
+    def unread(self) -> Changing:
+        """The same quantities for a path without its settings and without the turn: their columns are not used."""
+        return Changing(None, 0.0, {}, {}, {}, (*self.fixed, *self.ranges))
+
     def values_of(self, table: NumberTable, units: Units) -> dict[str, FloatArray]:
         """Return the checked values (N + 1,) of each setting from the columns of a table.
 
@@ -194,6 +199,11 @@ def case_along(case: Case, settings: Settings) -> Case:
 
 #: No tool, and no quantity that changes.
 UNCHANGED = Changing(None, 0.0, {}, {}, {}, ())
+
+
+def dimensions_along(case: Case) -> list[str]:
+    """Return the names of the dimensions of a case that change along its path."""
+    return [name for name in case.settings if name != TURN]
 
 
 def changing_of(case: Case) -> Changing:

@@ -75,7 +75,9 @@ def solve(
         own = None if progress is None else partial(progress, case.tasks[0].name)
         return solve_schedule(case, starts=starts, seed=seed, gap=gap, progress=own)
     if gap is not None:
-        raise CaseError("objective.as", "is missing: gap is for schedules along a path; use certify", source=case.source)
+        raise CaseError(
+            "objective.as", "is missing: gap is for schedules along a path; use certify", source=case.source
+        )
     solve_once = partial(
         _solve, starts=starts, seed=seed, jobs=jobs, compiled=compiled, progress=progress, solver=solver, phase=phase
     )

@@ -54,7 +54,9 @@ def schedule_figure(case: Case, solution: Solution) -> Figure | None:
         )
         bar = figure.colorbar(mesh, ax=axes)
         bar.set_label(f"{objective_name(case).split()[-1]} at the point", color=INK)
-        axes.plot(along, schedule.values[:, k], color=_SCHEDULE, linewidth=1.8, label="schedule", gid=f"schedule {name}")
+        axes.plot(
+            along, schedule.values[:, k], color=_SCHEDULE, linewidth=1.8, label="schedule", gid=f"schedule {name}"
+        )
         if schedule.constant is not None:
             held = schedule.constant.values[k]
             axes.axhline(held, color=_CONSTANT, linestyle="--", linewidth=1.4, label="best constant", gid="constant")

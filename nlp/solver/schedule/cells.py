@@ -222,8 +222,7 @@ def _up(values: FloatArray) -> FloatArray:
     return np.asarray(np.nextafter(values, math.inf))
 
 
-def _largest_within(
-    index: NDArray[np.intp], values: FloatArray, at: NDArray[np.intp], reach: int) -> FloatArray:
+def _largest_within(index: NDArray[np.intp], values: FloatArray, at: NDArray[np.intp], reach: int) -> FloatArray:
     """Return the largest value of the cells within some steps of each cell; minus infinity without any.
 
     Args:

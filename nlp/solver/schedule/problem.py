@@ -30,7 +30,7 @@ from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses
 from ...case.task import LEG_LENGTH, Task
 from ...errors import CaseError
-from ...path.reader import path_of_case
+from ...path.reader import path_without_settings
 from ...path.waypoints import Waypoints, waypoints
 from ...program.layout import reference_of
 
@@ -187,7 +187,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
-    points = waypoints(path_of_case(case))
+    points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
     model = closed.model

@@ -159,7 +159,10 @@ def _solution(
         value=sign * best.value,
         constant=held,
         rates=np.array([each.rate for each in problem.settings], dtype=np.float64) * unit,
-        design={each.name: units.shown(value, each.dimension) for each, value in zip(problem.design, best.d.tolist(), strict=True)},
+        design={
+            each.name: units.shown(value, each.dimension)
+            for each, value in zip(problem.design, best.d.tolist(), strict=True)
+        },
         bound=None if bound is None else sign * bound,
         sign=sign,
         seconds=seconds,
@@ -176,7 +179,9 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         s: (k,) settings at the point.
     """
     case, points = problem.case, problem.points
-    values = {each.name: float(value) for each, value in zip((*problem.design, *problem.settings), (*d, *s), strict=True)}
+    values = {
+        each.name: float(value) for each, value in zip((*problem.design, *problem.settings), (*d, *s), strict=True)
+    }
     parameters = {
         item.name: [
             values[name] if isinstance(value, Free) else value
@@ -192,7 +197,11 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         rotation = rotation @ _turned(local, values[TURN] if isinstance(turn, Free) else float(turn))
     task = case.tasks[0]
     p = points.positions[0]
-    twists = {"feed": (0.0, 0.0, 0.0, *points.feeds[0]), "thrust": (0.0, 0.0, 0.0, *axis), "tool": (*axis, *np.cross(p, axis))}
+    twists = {
+        "feed": (0.0, 0.0, 0.0, *points.feeds[0]),
+        "thrust": (0.0, 0.0, 0.0, *axis),
+        "tool": (*axis, *np.cross(p, axis)),
+    }
     if task.measure == LEG_LENGTH:
         task = Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False)
     elif task.follows:
