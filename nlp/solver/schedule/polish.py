@@ -99,8 +99,9 @@ def _search(
             steps = problem.steps[:, j] * (1 - INSIDE) / half[n + j]
             limited = np.flatnonzero(np.isfinite(steps)).tolist()
             row = x[n + j : n + rows * k : k]
-            g.append((row[1:] - row[:-1])[limited])
-            low, high = low + (-steps[limited]).tolist(), high + steps[limited].tolist()
+            # As parts of the rates: an error of one step would grow along the path.
+            g.append((row[1:] - row[:-1])[limited] / ca.DM(steps[limited]))
+            low, high = low + [-1.0] * len(limited), high + [1.0] * len(limited)
             if problem.is_periodic:
                 g.append(row[-1] - row[0])
                 low, high = [*low, 0.0], [*high, 0.0]
@@ -150,6 +151,7 @@ def _scales(problem: ScheduleProblem) -> tuple[FloatArray, FloatArray]:
 def _options(near: bool, iterations: int) -> dict[str, Any]:
     """Return the options of Ipopt."""
     own: dict[str, Any] = {"print_level": 0, "sb": "yes", "max_iter": iterations, "tol": _TOLERANCE}
+    own["bound_relax_factor"] = 0.0  # bounds and rates are kept exactly
     if near:
         pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
         own |= {"mu_init": _BARRIER, **dict.fromkeys(pushes, _NEAR)}

@@ -34,7 +34,7 @@ from .polish import Polished, polish
 from .problem import ScheduleProblem, ends, schedule_problem
 
 #: Largest number of designs from which the search begins.
-_DESIGNS = 12
+_DESIGNS = 8
 
 #: Function to call after each design, with the number of designs done, the number of all, and the best objective so far.
 DesignProgress = Callable[[int, int, float | None], None]
@@ -54,7 +54,7 @@ def solve_schedule(
 
     Args:
         case: the case.
-        starts: number of designs from which the search begins; the case's number, at most 12, if left out.
+        starts: number of designs from which the search begins; the case's number, at most 8, if left out.
         seed: seed of these designs; the case's seed if left out.
         gap: relative gap to which a bound of all schedules is proved; None for no bound.
         progress: function to call after each design.

@@ -1,0 +1,338 @@
+"""Schedules along a path: independent kinematics, exhaustive search, proved bounds, refusals and round trips."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from screwsynth.models import FloatArray
+from screwsynth.nlp import CaseError, load_case, solve
+from screwsynth.nlp.case.case import Case
+from screwsynth.nlp.case.pose import Free, OverPoses
+from screwsynth.nlp.cli.main import main
+from screwsynth.nlp.results.schema import result_schema
+from screwsynth.nlp.solver.schedule.cells import cell_bound
+from screwsynth.nlp.solver.schedule.dynamic import Grid, best_path, seeds, sliding_maximum
+from screwsynth.nlp.solver.schedule.polish import polish
+from screwsynth.nlp.solver.schedule.problem import schedule_problem
+
+_DEGREE = math.pi / 180
+_YAW = Path("cases/hexapod-yaw.toml").resolve()
+
+
+def _circle(count: int, lean: float = 30.0) -> tuple[FloatArray, FloatArray]:
+    """Return the angles (N,) of points of the circle, and their positions (N, 3), inches."""
+    angles = np.linspace(0, 2 * np.pi, count)
+    del lean
+    return angles, np.stack([4 + 5 * np.cos(angles), 3 + 5 * np.sin(angles), np.full(count, 20.0)], axis=1)
+
+
+def _struts(angle: float, position: FloatArray, turn: float, lean: float = 30.0) -> FloatArray:
+    """Return the vectors (6, 3) of the struts: own kinematics of LinuxCNC's hexapod, with the tool leaning outwards."""
+    centres, signs = np.repeat([0.0, 120.0, 240.0], 2) * _DEGREE, np.tile([-1, 1], 3)
+    base = 26.5 * np.stack([np.cos(centres), np.sin(centres), 0 * centres], axis=1)
+    at = centres + signs * 55 * _DEGREE
+    platform = 11.543 * np.stack([np.cos(at), np.sin(at), 0 * at], axis=1)
+
+    def about(axis: FloatArray, size: float) -> FloatArray:
+        x, y, z = axis
+        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        return np.asarray(np.eye(3) + np.sin(size) * K + (1 - np.cos(size)) * K @ K)
+
+    tilt = about(np.array([-np.sin(angle), np.cos(angle), 0.0]), lean * _DEGREE)
+    R = tilt @ about(np.array([0.0, 0.0, 1.0]), turn)
+    return np.asarray(position + platform @ R.T - base)
+
+
+def _F(angle: float, position: FloatArray, turn: float) -> float:
+    """Return F of the feed direction: the sum of the squared components of the struts' unit vectors along it."""
+    struts = _struts(angle, position, turn)
+    feed = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    return float(((struts @ feed) ** 2 / (struts**2).sum(axis=1)).sum())
+
+
+def _path(file: Path, count: int, lean: float = 30.0) -> None:
+    """Write the circle as a table of poses with times."""
+    angles, positions = _circle(count)
+    half = lean * _DEGREE / 2
+    with file.open("w") as text:
+        text.write("t,x,y,z,qw,qx,qy,qz\n")
+        for a, p in zip(angles, positions, strict=True):
+            q = (math.cos(half), -math.sin(a) * math.sin(half), math.cos(a) * math.sin(half), 0.0)
+            text.write(",".join(repr(float(v)) for v in (5 * a, *p, *q)) + "\n")
+
+
+def _written(folder: Path, *changes: tuple[str, str], count: int = 0, lean: float = 30.0) -> Path:
+    """Return a changed copy of the shipped case; with its own path for a number of points."""
+    text = _YAW.read_text()
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    if count:
+        _path(folder / "own.csv", count, lean)
+        text = text.replace("hexapod-yaw.csv", "own.csv")
+    else:
+        (folder / "hexapod-yaw.csv").write_bytes(_YAW.with_suffix(".csv").read_bytes())
+    text = text[: text.index("[expect]")]
+    file = folder / "case.toml"
+    file.write_text(text)
+    return file
+
+
+_STRUT = (
+    ('[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"                     # the direction of the feed at each point\n', ""),
+    ('as = "mean"', 'as = "worst"\nminimise = "leg_length"'),
+)
+
+
+@pytest.fixture(scope="module")
+def yaw() -> Case:
+    return load_case(str(_YAW))
+
+
+def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
+    solution = solve(yaw, gap=5e-4)
+    schedule = solution.schedule
+    assert schedule is not None and schedule.constant is not None and schedule.bound is not None
+    assert solution.status.value == "locally optimal"
+    assert schedule.value == pytest.approx(1.6913299, abs=2e-7)
+    assert solution.F == schedule.value
+    assert schedule.constant.value == pytest.approx(1.657882, abs=1e-6)
+    assert schedule.constant.values[0] == pytest.approx(-0.7011, abs=1e-3)
+    assert schedule.gain == pytest.approx(0.02017, abs=1e-4)
+    # A bound below a schedule would be a false proof; the gap is what was asked for.
+    assert 1.691329 < schedule.value <= schedule.bound <= 1.6925
+    assert schedule.gap is not None and schedule.gap <= 5e-4
+    assert schedule.names == ("turn",)
+    # Objective and limits again, by kinematics of this file.
+    angles, positions = _circle(200)
+    turns = schedule.values[:, 0] * _DEGREE
+    F = [_F(a, p, s) for a, p, s in zip(angles, positions, turns, strict=True)]
+    assert np.mean(F) == pytest.approx(schedule.value, abs=1e-9)
+    np.testing.assert_allclose(schedule.F, F, atol=1e-9)
+    assert F[57] == pytest.approx(1.7382456, abs=2e-3)
+    lengths = np.array([np.linalg.norm(_struts(a, p, s), axis=1) for a, p, s in zip(angles, positions, turns, strict=True)])
+    assert lengths.min() >= 17 * (1 - 1e-9) and lengths.max() <= 43 * (1 + 1e-9)
+    steps = np.abs(np.diff(schedule.values[:, 0]))
+    assert (steps <= 5 * np.diff(schedule.times)).all()
+    assert np.abs(schedule.values).max() <= 75
+
+
+def test_ipopt_alone_stays_on_another_ridge(yaw: Case) -> None:
+    problem = schedule_problem(yaw)
+    found = polish(problem, np.zeros(0), np.zeros((200, 1)), near=False)
+    assert found is not None and found.value == pytest.approx(1.670501, abs=1e-5)
+
+
+def test_worst_value_has_no_gain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = _written(tmp_path, ('as = "mean"', 'as = "worst"'))
+    with pytest.raises(SystemExit) as end:
+        main(["solve", str(file)])
+    assert end.value.code == 0
+    assert "worst F = 1.375807 along 199 segments (best constant turn 1.375807, no gain)" in capsys.readouterr().out
+
+
+def test_longest_strut(tmp_path: Path) -> None:
+    file = _written(tmp_path, *_STRUT, ("max = 43", "max = 60"), count=200, lean=40)
+    schedule = solve(load_case(str(file))).schedule
+    assert schedule is not None and schedule.constant is not None
+    assert schedule.value == pytest.approx(40.79375, abs=1e-4)
+    assert schedule.constant.value == pytest.approx(41.3713, abs=1e-3)
+    angles, positions = _circle(200)
+    turns = schedule.values[:, 0] * _DEGREE
+    longest = max(
+        np.linalg.norm(_struts(a, p, s, 40), axis=1).max() for a, p, s in zip(angles, positions, turns, strict=True)
+    )
+    assert longest == pytest.approx(schedule.value, abs=1e-8)
+    assert schedule.F.max() == pytest.approx(longest, abs=1e-8)
+
+
+def test_longest_strut_below_the_least_is_infeasible(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = _written(tmp_path, *_STRUT, ("max = 43", "max = 40.6"), count=200, lean=40)
+    with pytest.raises(SystemExit) as end:
+        main(["solve", str(file)])
+    assert end.value.code == 1
+    assert "infeasible: no schedule of turn within the limits and rates was found" in capsys.readouterr().out
+
+
+def test_a_finer_path_has_nearly_the_same_mean(tmp_path: Path) -> None:
+    schedule = solve(load_case(str(_written(tmp_path, count=1000)))).schedule
+    assert schedule is not None and schedule.value == pytest.approx(1.692791, abs=2e-6)
+
+
+def test_a_closed_contour_ends_as_it_begins(tmp_path: Path) -> None:
+    file = _written(tmp_path, ("tool = {", "periodic = true\ntool = {"), count=60)
+    periodic, free = solve(load_case(str(file))).schedule, solve(load_case(str(_written(tmp_path, count=60)))).schedule
+    assert periodic is not None and free is not None
+    assert periodic.values[0, 0] == pytest.approx(periodic.values[-1, 0], abs=1e-6)
+    assert periodic.value <= free.value + 1e-9
+    assert periodic.gain is not None and periodic.gain >= 0
+
+
+def test_dynamic_programming_equals_exhaustive_search() -> None:
+    rng = np.random.default_rng(3)
+    for is_worst, count in itertools.product((True, False), (3, 5)):
+        objective = rng.normal(size=(count, 6))
+        objective[rng.random(objective.shape) < 0.15] = -math.inf
+        weights = rng.random(count)
+        reach = rng.integers(0, 3, count - 1)
+        grid = Grid(np.arange(count), np.arange(6.0), objective, reach, weights)
+        found = best_path(grid, is_worst=is_worst)
+        best = -math.inf
+        for way in itertools.product(range(6), repeat=count):
+            if (np.abs(np.diff(way)) <= reach).all():
+                values = objective[np.arange(count), way]
+                best = max(best, values.min() if is_worst else float(values @ weights))
+        if found is None:
+            assert best == -math.inf
+            continue
+        values = objective[np.arange(count), found.astype(int)]
+        assert (np.abs(np.diff(found)) <= reach).all()
+        assert (values.min() if is_worst else float(values @ weights)) == pytest.approx(best)
+
+
+def test_sliding_maximum_equals_its_definition() -> None:
+    values = np.random.default_rng(0).normal(size=23)
+    for reach in (0, 1, 2, 5, 22, 40):
+        expected = [values[max(m - reach, 0) : m + reach + 1].max() for m in range(23)]
+        np.testing.assert_array_equal(sliding_maximum(values, reach), expected)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bound_is_never_below_a_sampled_schedule(tmp_path: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    changes = [
+        ("x4 = 5", f"x4 = {rng.uniform(2, 20):.6f}"),
+        ("rate = 5", f"rate = {rng.uniform(2, 40):.6f}"),
+        ("max = 43", f"max = {rng.uniform(42, 48):.6f}"),
+    ]
+    changes += [('as = "mean"', 'as = "worst"')] if seed % 2 else []
+    problem = schedule_problem(load_case(str(_written(tmp_path, *changes, count=8))))
+    d = np.zeros(0)
+    best = -math.inf
+    limits = problem.steps[:, 0]
+    for _ in range(4000):
+        s = np.empty((len(problem.points), 1))
+        s[0] = rng.uniform(-75, 75) * _DEGREE
+        for i, step in enumerate(limits):
+            s[i + 1] = np.clip(s[i] + rng.uniform(-step, step), -75 * _DEGREE, 75 * _DEGREE)
+        values = problem.at(d, s)
+        if (values.excess <= 0).all():
+            best = max(best, problem.value(d, s))
+    assert math.isfinite(best)
+    # Each bound holds for any known schedule, also for a poor one.
+    for known in (best, best - 0.05 * abs(best)):
+        assert cell_bound(problem, d, known, 1e-3).bound >= best
+    polished = [polish(problem, d, s) for s in seeds(problem, d, np.zeros(1))]
+    assert max(each.value for each in polished if each is not None) <= cell_bound(problem, d, best, 1e-4).bound
+
+
+def test_written_schedule_keeps_rates_and_limits(tmp_path: Path) -> None:
+    target, result = tmp_path / "s.csv", tmp_path / "r.json"
+    with pytest.raises(SystemExit) as end:
+        main(["solve", str(_written(tmp_path, count=40)), "--schedule", str(target), "--json", str(result)])
+    assert end.value.code == 0
+    with target.open() as text:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(text)]
+    assert list(rows[0]) == ["x", "y", "z", "qw", "qx", "qy", "qz", "turn", "t"]
+    for one, other in itertools.pairwise(rows):
+        assert abs(other["turn"] - one["turn"]) <= 5 * (other["t"] - one["t"])
+    assert all(-75 <= row["turn"] <= 75 for row in rows)
+    data = json.loads(result.read_text())
+    jsonschema.validate(data, result_schema("solve"))
+    assert data["status"] == "locally optimal"
+    assert data["schedule"]["names"] == ["turn"] and len(data["schedule"]["rows"]) == 40
+    assert data["schedule"]["rates"][0]["used"] <= data["schedule"]["rates"][0]["max"] * (1 + 1e-12)
+
+
+def test_case_is_read_again_from_its_text(yaw: Case, tmp_path: Path) -> None:
+    text = yaw.to_toml()
+    (tmp_path / "again.toml").write_text(text)
+    again = load_case(str(tmp_path / "again.toml"))
+    assert again.settings == yaw.settings and again.over_path is OverPoses.MEAN
+    assert again.tasks[0].follows == "feed" and again.to_toml() == text
+    moving = load_case(str(_written(tmp_path, ("x3 = 0", 'x3 = { min = 0, max = 9, per = "path", rate = 2 }'))))
+    assert moving.settings["x3"] == Free(0.0, 9 * _DEGREE, rate=2 * _DEGREE)
+    assert 'per = "path"' in moving.to_toml()
+    assert moving.replace(x3=4, turn=2).settings == {}
+
+
+_PER_PATH = ("x3 = 0", 'x3 = { min = 0, max = 30, per = "path", rate = 2 }')
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ([("x3 = 0", 'x3 = { min = 0, max = 30, per = "path" }')],
+         "robot.parameters.x3.rate: is missing: a number that changes along the path needs its largest rate, or inf"),
+        ([("x3 = 0", "x3 = { min = 0, max = 30, rate = 2 }")], 'robot.parameters.x3.rate: has an effect only with per = "path"'),
+        ([("rate = 5", "rate = 0")], "path.tool.turn.rate = 0.0: must be positive, or inf for no limit"),
+        ([("rate = 5", "rate = -5")], "path.tool.turn.rate = -5.0: must be positive, or inf for no limit"),
+        ([("rate = 5", "rate = nan")], "path.tool.turn.rate = nan: must be positive, or inf for no limit"),
+        ([(", rate = 5", "")],
+         "path.tool.turn.rate: is missing: a number that changes along the path needs its largest rate, or inf"),
+        ([('over = "path"\nas = "mean"', 'minimise = "leg_length"')],
+         'objective.minimise = "leg_length": needs over = "path" and as = "worst"'),
+        ([('follows = "feed"', 'follows = "feed"\npitch = 0')], "task[0].pitch: conflicts with follows; state the motion in one way"),
+        ([('follows = "feed"', 'follows = "thrust"'), ("tool = {", "#")], "needs path.tool with the tool's axis"),
+        ([("leg_length = {", 'over = "path"\nleg_length = {')], "limits.over = \"path\": conflicts with objective.as"),
+        ([("position = [9,", "position = [{ min = 8, max = 9 },")], "pose: must be fixed with objective.as"),
+        ([('as = "mean"', 'as = "median"')], "objective.as"),
+        ([("axis = [0, 0, 1], turn", "axis = [0, 0, 0], turn")], "path.tool.axis = [0.0, 0.0, 0.0]: must not be zero"),
+    ],
+)  # fmt: skip
+def test_bad_cases_are_refused(tmp_path: Path, changes: list[tuple[str, str]], words: str) -> None:
+    with pytest.raises(CaseError) as error:
+        load_case(str(_written(tmp_path, *changes)))
+    assert words in str(error.value)
+
+
+def test_change_along_a_missing_path_is_refused(tmp_path: Path) -> None:
+    text = _written(tmp_path, _PER_PATH).read_text()
+    (tmp_path / "case.toml").write_text(text[: text.index("[path]")])
+    with pytest.raises(CaseError, match='robot.parameters.x3.per = "path": the case states no path'):
+        load_case(str(tmp_path / "case.toml"))
+
+
+def _refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(list(arguments))
+    assert end.value.code == 2
+    return " ".join(capsys.readouterr().err.split())
+
+
+def test_commands_refuse_what_they_cannot_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    two = str(_written(tmp_path, _PER_PATH))
+    assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(capsys, "solve", two, "--certify")
+    assert "turn changes along the path, but this command takes one robot" in _refusal(capsys, "evaluate", str(_YAW))
+    assert "--round: is for designs at stated poses" in _refusal(capsys, "solve", str(_YAW), "--round", "1")
+    schedule = ("solve", "paper-4.1-helical", "--schedule", str(tmp_path / "none.csv"))
+    assert "--schedule: the case optimises nothing along a path" in _refusal(capsys, *schedule)
+    assert not (tmp_path / "none.csv").exists()
+
+
+def test_path_of_one_point_and_path_without_times_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = _written(tmp_path)
+    (tmp_path / "hexapod-yaw.csv").write_text("t,x,y,z\n0,9,3,20\n")
+    assert "fewer than two points" in _refusal(capsys, "solve", str(file))
+    (tmp_path / "hexapod-yaw.csv").write_text("x,y,z\n9,3,20\n4,8,20\n")
+    assert "turn.rate: needs the time of every segment, which the path does not state" in _refusal(capsys, "solve", str(file))
+
+
+def test_picture_has_the_schedule_and_the_constant(tmp_path: Path) -> None:
+    from screwsynth.nlp.output.pictures.schedules import schedule_figure
+
+    case = load_case(str(_written(tmp_path, count=30)))
+    figure = schedule_figure(case, solve(case))
+    assert figure is not None
+    marks = {artist.get_gid() for artist in figure.findobj()}
+    assert {"schedule turn", "constant", "rate turn", "rate limit"} <= marks
