@@ -105,7 +105,7 @@ def sampled(rows: Rows, setting: str) -> tuple[Array, Array]:
 @cache
 def judged(setting: str) -> Judgement:
     case, rows = (turning(), TURN_ROWS) if setting == "turn" else (moving(), RADIUS_ROWS)
-    return judge_path(case, path_of(case, setting, rows), gap=1e-3 if setting == "turn" else 1e-8)
+    return judge_path(case, path_of(case, setting, rows), gap=1e-8)
 
 
 @pytest.mark.parametrize(("setting", "rows"), [("turn", TURN_ROWS), ("x1", RADIUS_ROWS)])
