@@ -95,8 +95,8 @@ def _check_over_path(case: ScheduledCase) -> None:
         raise CaseError("objective.as", "must be 'mean' or 'worst'", getattr(case.over_path, "value", case.over_path))
     if case.path is None:
         raise CaseError(key, "the case states no path", over)
-    if case.limits_over:
-        fault = "conflicts with objective.as: limits then hold at the points of the path; remove over in [limits]"
+    if case.limits_over == "workspace":
+        fault = "conflicts with objective.as: limits are then those of the path; use over = 'path'"
         raise CaseError("limits.over", f"{fault}, and prove the schedule with path --along", case.limits_over)
     if case.workspace is not None:
         raise CaseError("workspace", "conflicts with objective.as, which is about the path; remove [workspace]")

@@ -69,11 +69,13 @@ def path(
     from pathlib import Path
 
     from ..case.pose import RotationForm
+    from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
+    from ..path.settings import changing_of, dimensions_along
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
-    from ..results.path import path_result, violating_poses
+    from ..results.path import path_result, settings_at, violating_poses
     from ..words.poses import evaluate_command
     from .proofs import path_premises, path_proof_text, proof_record
 
@@ -104,8 +106,16 @@ def path(
 
         check_library("plotly", "pages with a robot")
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
+    if moving := dimensions_along(loaded):
+        for option, file in (("--plot", plot), ("--html", html), ("--csv", csv_file)):
+            if file is not None:
+                raise InputError(f"{option}: is not supported while {moving[0]} changes along the path")
     with spinner("reading the path") as show:
-        programmed = path_of_case(loaded, choices) if along is None else read_path(along, loaded.units, choices)
+        programmed = (
+            path_of_case(loaded, choices)
+            if along is None
+            else read_path(along, loaded.units, choices, changing_of(loaded))
+        )
         premises = path_premises(proof, loaded, along, choices)
         limit = TIME_LIMIT if time is None else time
         judged = judge_path(
@@ -116,7 +126,10 @@ def path(
     def command(claim: PathVerdictData) -> str:
         """Return the command that shows a violated claim."""
         pose, *further = violating_poses(judged, claim)
-        return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY, claim=claim.name, further=further)
+        own = settings_at(judged, claim)
+        shown = loaded.replace(own) if own else loaded
+        further = [] if own else further
+        return evaluate_command(case, shown, chosen | own, pose, RotationForm.RPY, claim=claim.name, further=further)
 
     @cache
     def picture() -> contents.PathPicture:

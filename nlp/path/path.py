@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -28,11 +28,13 @@ from .options import Between
 from .orientation import (
     Order,
     matrices_from_quaternions,
+    quaternion_products,
     quaternions_from_angles,
     shortest_turns,
     symbolic_rotation,
     turned,
 )
+from .settings import Settings, ToolTurn
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -125,6 +127,8 @@ class ProgrammedPath:
         idle: ignored words and lines, which cause no motion.
         warnings: sentences about the file that a user has to know.
         frame: frame of the path in the world frame; None if the path is in world coordinates.
+        tool: turn about the tool's axis, which comes after the orientations of the path; None without one.
+        settings: values of dimensions that change along the path.
     """
 
     source: str
@@ -139,6 +143,8 @@ class ProgrammedPath:
     idle: tuple[Idle, ...] = ()
     frame: PathFrame | None = None
     warnings: tuple[str, ...] = ()
+    tool: ToolTurn | None = None
+    settings: Settings = field(default_factory=Settings)
 
     def __post_init__(self) -> None:
         for array in (self.knots, self.lines, self.kinds, self.durations, self.arcs, self.planes):
@@ -172,6 +178,33 @@ class ProgrammedPath:
     def time(self) -> float:
         """Total time of the segments with a stated time, seconds."""
         return math.fsum(self.durations[np.isfinite(self.durations)].tolist())
+
+    def with_knots(self, kept: NDArray[np.bool_]) -> ProgrammedPath:
+        """Return the path of the segments that end at kept knots; the first knot always stays.
+
+        Args:
+            kept: (n,) True for each segment whose end stays.
+        """
+        which, tool, values = np.concatenate([[True], kept]), self.tool, self.settings.values
+        return replace(
+            self,
+            knots=self.knots[which],
+            lines=self.lines[kept],
+            kinds=self.kinds[kept],
+            durations=self.durations[kept],
+            tool=None if tool is None else replace(tool, angles=tool.angles[which]),
+            settings=self.settings if values is None else replace(self.settings, values=values[which]),
+        )
+
+    @cached_property
+    def resets(self) -> NDArray[np.bool_]:
+        """Whether a setting changes in each segment (n,)."""
+        found = np.zeros(len(self), dtype=bool)
+        if self.tool is not None:
+            found |= np.diff(self.tool.angles) != 0
+        if self.settings.values is not None:
+            found |= np.diff(self.settings.values, axis=0).any(axis=1)
+        return found
 
     @cached_property
     def lengths(self) -> FloatArray:
@@ -208,6 +241,8 @@ class ProgrammedPath:
         positions, frame = points[:, :3], self.frame
         if frame is not None:
             positions, quaternions = frame.positions(positions), frame.orientations(quaternions)
+        if self.tool is not None:
+            quaternions = quaternion_products(quaternions, self.tool.quaternions(index, parameter[:, 0]))
         return Poses(positions, matrices_from_quaternions(quaternions))
 
     def arc_of(self, segment: int) -> tuple[Arc, int]:
@@ -298,7 +333,11 @@ class Segment:
 
     def expressions(self, s: SX) -> SymbolicPose:
         """Return the pose as expressions of the path parameter (1, 1)."""
-        pose, frame = self.shape.pose(SX(self.numbers), s), self.path.frame
+        pose, frame, tool = self.shape.pose(SX(self.numbers), s), self.path.frame, self.path.tool
+        if tool is not None:
+            start, end = tool.angles[self.index : self.index + 2].tolist()
+            turn = matrix_from_axis_angle(SX(tool.axis.tolist()), start + s * (end - start))
+            pose = pose._replace(rotation=pose.rotation @ turn)
         if frame is None:
             return pose
         R = SX(frame.rotation.tolist())

@@ -1,21 +1,38 @@
 """Tool paths from tables of poses: each row of a CSV file is a point, with the pose columns of a case.
 
-Columns ``t`` (seconds) or ``feed`` (length or angle per second) state the times. Values are in the units of the case.
+Columns ``t`` (seconds) or ``feed`` (length or angle per second) state the times. Each setting of the case has a column:
+``turn`` about the tool's axis, and dimensions by their names. Values are in the units of the case.
 """
 
 from __future__ import annotations
+
+from typing import TypedDict
 
 import numpy as np
 
 from ...models import Dimension, FloatArray
 from ..case.csvrows import POSE_ROWS, NumberTable, check_header, csv_rows, number_table
+from ..case.pathfile import TURN
 from ..case.pose import LARGEST
 from ..errors import CaseError, InputError
 from ..units import Units
 from .options import Between, PathOptions
 from .orientation import ORDERS, order_named, roll_pitch_yaw
 from .path import Kind, ProgrammedPath
+from .settings import UNCHANGED, Changing, Settings, ToolTurn
 from .standing import duration_at, rest_length, turns_between, without_rests
+
+#: Advice for a dimension whose drive is of interest.
+_JOINTS = "give the robot joint by joint for that"
+
+
+class _Set(TypedDict, total=False):
+    """Fields of a path with the tool's turn, the settings, and sentences about unused columns."""
+
+    tool: ToolTurn
+    settings: Settings
+    warnings: tuple[str, ...]
+
 
 #: Columns of poses and of times.
 _ROWS = POSE_ROWS._replace(others={**POSE_ROWS.others, "t": ("t",), "feed": ("feed",)})
@@ -25,7 +42,9 @@ _LEFT_OUT = {"qw": "1", "axis_z": "1"}
 _ROUNDING = 1e-6
 
 
-def read_poses(text: str, source: str, units: Units, options: PathOptions) -> ProgrammedPath:
+def read_poses(
+    text: str, source: str, units: Units, options: PathOptions, changing: Changing = UNCHANGED
+) -> ProgrammedPath:
     """Return the path through the rows of a table.
 
     Args:
@@ -33,13 +52,14 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
         source: name of the file, for messages.
         units: units of the case.
         options: options for reading; only the interpolation between rows has an effect.
+        changing: quantities of the case with columns of their own.
 
     Raises:
         InputError: the table has a fault, or fewer than two points.
     """
     if order_named(options.angles) != ORDERS["rpy"]:
         raise InputError(f"{source}: angles = {options.angles!r}: is only for G-code; tables have roll, pitch and yaw")
-    table = _read_table(text, source)
+    table = _read_table(text, source, changing)
     has_angles = not {"qw", "axis_x", "angle"} & table.columns.keys()
     between = options.between or (Between.ANGLES if has_angles else Between.SLERP)
     if between is Between.ANGLES and not has_angles:
@@ -61,12 +81,31 @@ def read_poses(text: str, source: str, units: Units, options: PathOptions) -> Pr
         np.empty(0, dtype=np.uint8),
         ORDERS["rpy"],
         between,
+        **_settings(table, changing, units),
     )
     # A repeated point is a dwell if its time is stated, else no segment.
     return without_rests(path, are_timed="t" in table.columns)
 
 
-def _read_table(text: str, source: str) -> NumberTable:
+def _settings(table: NumberTable, changing: Changing, units: Units) -> _Set:
+    """Return the tool's turn and the settings of the rows.
+
+    Raises:
+        InputError: a value is out of its range, or changes too fast.
+    """
+    values = changing.values_of(table, units)
+    unused = [f"column {name}: not used" for name in table.columns if name in changing.fixed]
+    drives = [f"F locks {name}; its drive has no force or power here: {_JOINTS}" for name in changing.own]
+    found = _Set(warnings=(*unused, *drives))
+    if changing.axis is not None:
+        found["tool"] = ToolTurn(changing.axis, values.get(TURN, np.full(len(table.rows), changing.turn)))
+    if changing.own:
+        whole = np.stack([values[name] for name in changing.own], axis=1)
+        found["settings"] = Settings(tuple(changing.own.values()), whole)
+    return found
+
+
+def _read_table(text: str, source: str, changing: Changing) -> NumberTable:
     """Return the values of a file.
 
     Raises:
@@ -78,7 +117,10 @@ def _read_table(text: str, source: str) -> NumberTable:
         raise InputError(
             f"{source}: has no rows: expected a first row with the names of the columns, then rows of values"
         )
-    found = check_header(header, _ROWS, lambda fault: CaseError(f"row {top}", fault, source=source))
+    further = {name: (name,) for name in (*changing.ranges, *changing.fixed)}
+    rows = _ROWS._replace(others={**_ROWS.others, **further})
+    found = check_header(header, rows, lambda fault: CaseError(f"row {top}", fault, source=source))
+    changing.check_columns(header, source)
     if {"t", "feed"} <= found.keys():
         raise CaseError(f"row {top}", "column 'feed' conflicts with 't'; keep one of them", source=source)
     turns = [names for key, names in found.items() if key in POSE_ROWS.others]

@@ -21,6 +21,7 @@ from .placing import placed
 from .poses_csv import read_poses
 from .printer import read_printer_program
 from .printerwords import sign_of_printer
+from .settings import UNCHANGED, Changing, ToolTurn, changing_of
 
 #: Largest size of a file, bytes: some ten million lines.
 _LARGEST = 2**28
@@ -28,18 +29,21 @@ _LARGEST = 2**28
 _HALF_TURN = 1e-9
 
 
-def read_path(file: str | Path, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
+def read_path(
+    file: str | Path, units: Units, options: PathOptions | None = None, changing: Changing = UNCHANGED
+) -> ProgrammedPath:
     """Return the tool path of a file.
 
     Args:
         file: name of the file.
         units: units of the case.
         options: choices that the file leaves open.
+        changing: quantities of the case that change along the path.
 
     Raises:
         InputError: the file cannot be read, or contains an unsupported word.
     """
-    return path_of_text(text_of_path(file), str(file), units, options)
+    return path_of_text(text_of_path(file), str(file), units, options, changing)
 
 
 def text_of_path(file: str | Path) -> str:
@@ -64,7 +68,9 @@ def is_table(file: str) -> bool:
     return file.lower().endswith(".csv")
 
 
-def path_of_text(text: str, source: str, units: Units, options: PathOptions | None = None) -> ProgrammedPath:
+def path_of_text(
+    text: str, source: str, units: Units, options: PathOptions | None = None, changing: Changing = UNCHANGED
+) -> ProgrammedPath:
     """Return the tool path of a file's text.
 
     Args:
@@ -72,15 +78,19 @@ def path_of_text(text: str, source: str, units: Units, options: PathOptions | No
         source: name of the file, which distinguishes tables from G-code.
         units: units of the case.
         options: choices that the file leaves open.
+        changing: quantities of the case that change along the path.
 
     Raises:
         InputError: the text contains an unsupported word.
     """
     options = options or PathOptions()
     if is_table(source):
-        path = read_poses(text, source, units, options)
+        path = read_poses(text, source, units, options, changing)
     else:
+        changing.refuse_without_table(source)
         path = _path_of_program(text.split("\n"), source, units, options)
+        if changing.axis is not None:
+            path = replace(path, tool=ToolTurn(changing.axis, np.full(len(path.knots), changing.turn)))
     if path.between is Between.SLERP:
         _check_turns(path)
     return path
@@ -133,13 +143,27 @@ def in_place_of_case(path: ProgrammedPath, case: Case) -> ProgrammedPath:
     return placed(path, fixed)
 
 
-def stated_path(case: Case, options: PathOptions | None = None) -> ProgrammedPath:
-    """Return the tool path of a case, in its frame; arguments and errors are those of :func:`path_of_case`."""
+def path_without_settings(case: Case) -> ProgrammedPath:
+    """Return the tool path of a case before its settings are known; errors are those of :func:`path_of_case`."""
+    return in_place_of_case(stated_path(case, changing=changing_of(case).unread), case)
+
+
+def stated_path(case: Case, options: PathOptions | None = None, changing: Changing | None = None) -> ProgrammedPath:
+    """Return the tool path of a case, in its frame.
+
+    Args:
+        case: the case.
+        options: options that replace those of the case.
+        changing: quantities that change along the path; those of the case if left out.
+
+    Raises:
+        CaseError, InputError: as :func:`path_of_case`.
+    """
     stated = case.path
     if stated is None:
         raise CaseError("path", "is missing: give the table [path], or the file of a path", source=case.source)
     # Messages name the file with its whole path; results use the stated name.
-    path = read_path(stated.name, case.units, options or options_of(stated))
+    path = read_path(stated.name, case.units, options or options_of(stated), changing or changing_of(case))
     return replace(path, source=stated.file)
 
 

@@ -44,7 +44,9 @@ def rest_length(positions: FloatArray) -> float:
     return STILL * float(np.abs(positions).max(initial=0.0))
 
 
-def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.intp]:
+def standing(
+    knots: FloatArray, order: Order, between: Between, resets: NDArray[np.bool_] | None = None
+) -> NDArray[np.intp]:
     """Return for each knot the index (n,) of the first knot of the same rest.
 
     If the platform has not moved since an earlier knot, this is the earlier knot; otherwise it is the knot itself.
@@ -53,6 +55,7 @@ def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.in
         knots: (n, 6) positions and angles.
         order: convention of the angles.
         between: interpolation between two knots.
+        resets: (n - 1,) True between knots where a setting changes, which is a motion of the robot.
     """
     most, at = rest_length(knots[:, :3]), np.arange(len(knots))
 
@@ -60,7 +63,8 @@ def standing(knots: FloatArray, order: Order, between: Between) -> NDArray[np.in
         ways = np.linalg.norm(np.diff(one[:, :3], axis=0), axis=1)
         return np.asarray((ways <= most) & (turns_between(one[:, 3:], order, between) <= STILL))
 
-    for k in (np.flatnonzero(stands(knots)) + 1).tolist():
+    still = stands(knots) if resets is None else stands(knots) & ~resets
+    for k in (np.flatnonzero(still) + 1).tolist():
         # Many short steps in succession are a motion.
         if at[k - 1] == k - 1 or stands(knots[[at[k - 1], k]])[0]:
             at[k] = at[k - 1]
@@ -107,7 +111,7 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
     Raises:
         InputError: the path has only such lines.
     """
-    at = standing(path.knots, path.order, path.between)
+    at = standing(path.knots, path.order, path.between, path.resets)
     still = (at[1:] < np.arange(1, len(path.knots))) & (path.kinds == Kind.LINE)
     # A dwell after removed points is where the platform is at rest.
     knots = path.knots[at]
@@ -118,10 +122,4 @@ def without_rests(path: ProgrammedPath, *, are_timed: bool) -> ProgrammedPath:
     kept, durations = ~still, _times_of_steps(path, at)
     if not kept.any():
         raise InputError(f"{path.source}: there is no path: all points are the same pose")
-    return replace(
-        path,
-        knots=knots[np.concatenate([[True], kept])],
-        lines=path.lines[kept],
-        kinds=path.kinds[kept],
-        durations=durations[kept],
-    )
+    return replace(path, knots=knots, durations=durations).with_knots(kept)

@@ -51,6 +51,20 @@ class Waypoints(NamedTuple):
         return np.concatenate([[0.0], np.cumsum(self.seconds)])
 
 
+def with_places(path: ProgrammedPath, points: Waypoints, places: FloatArray) -> Waypoints:
+    """Return points of a path together with further places.
+
+    Args:
+        path: the path.
+        points: points of the path.
+        places: (k, 2) segment and path parameter of each further place.
+    """
+    own = np.stack(points.points, axis=1)
+    # The last point is the end of the last segment.
+    every = np.unique(np.vstack([own, places]), axis=0)
+    return _at_points(path, Points(every[:, 0].astype(np.intp), every[:, 1]))
+
+
 def waypoints(path: ProgrammedPath, least: int = LEAST) -> Waypoints:
     """Return the points of a path at which settings have values.
 
@@ -70,14 +84,22 @@ def waypoints(path: ProgrammedPath, least: int = LEAST) -> Waypoints:
     if len(segments) < 1:
         raise InputError(f"{path.source}: there is no path: fewer than two points")
     ends = Points(np.append(segments, len(path) - 1).astype(np.intp), np.append(parameters, 1.0))
-    poses = path.poses_at(ends.segments, ends.parameters)
-    seconds = path.durations[segments] / pieces[segments]
-    steps = seconds if np.isfinite(seconds).all() and seconds.sum() > 0 else sizes[segments] / pieces[segments]
+    return _at_points(path, ends)
+
+
+def _at_points(path: ProgrammedPath, points: Points) -> Waypoints:
+    """Return poses, feeds, times and weights at points of a path: the beginnings of segments, and points inside."""
+    segments = points.segments[:-1]
+    end = np.where(points.segments[1:] == segments, points.parameters[1:], 1.0)
+    part, sizes = end - points.parameters[:-1], _sizes(path)
+    poses = path.poses_at(points.segments, points.parameters)
+    seconds = path.durations[segments] * part
+    steps = seconds if np.isfinite(seconds).all() and seconds.sum() > 0 else sizes[segments] * part
     if not steps.sum() > 0:
         steps = np.ones(len(steps))
     weights = np.concatenate([[steps[0]], 0.5 * (steps[1:] + steps[:-1]), [steps[-1]]])
     weights = weights / math.fsum(weights.tolist())
-    return Waypoints(ends, poses.positions, poses.rotations, _feeds(path, ends), seconds, weights)
+    return Waypoints(points, poses.positions, poses.rotations, _feeds(path, points), seconds, weights)
 
 
 def _sizes(path: ProgrammedPath) -> FloatArray:

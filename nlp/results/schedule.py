@@ -51,6 +51,10 @@ class ScheduleData(JsonObject):
         bound: proved bound of the objective of all schedules of this design; absent if no proof was requested.
         gap: relative distance of the bound from the objective.
         statement: proved statement in words.
+        proved: true if the schedule is proved to have no singularity and no violated limit along the whole path; absent
+            without limits over the path.
+        added: number of points that were added to keep the limits between the points; absent without limits over the
+            path.
     """
 
     names: tuple[str, ...]
@@ -67,6 +71,8 @@ class ScheduleData(JsonObject):
     bound: Absent[float]
     gap: Absent[float]
     statement: Absent[str]
+    proved: Absent[bool]
+    added: Absent[int]
 
 
 def schedule_data(schedule: Schedule) -> ScheduleData:
@@ -93,4 +99,6 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         bound=schedule.bound,
         gap=schedule.gap,
         statement=schedule.statement or None,
+        proved=None if schedule.judgement is None else schedule.judgement.is_proved,
+        added=None if schedule.judgement is None else schedule.added,
     )

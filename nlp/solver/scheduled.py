@@ -14,6 +14,7 @@ from ...models import Dimension, FloatArray
 from ...models.values import dataclass
 from ..case.pose import OverPoses
 from ..path.path import Poses
+from ..proof.workspace.judgement import Judgement
 from ..units import Units
 
 #: Relative gain over the best constant below which a schedule has no gain.
@@ -49,6 +50,8 @@ class Schedule:
         bound: proved bound of the objective of all schedules of this design; None without a proof.
         sign: 1 for a maximum, -1 for a minimum.
         seconds: wall time.
+        judgement: verdicts on ranks and limits along the whole path; None without limits over the path.
+        added: number of points that were added because limits were violated there.
     """
 
     names: tuple[str, ...]
@@ -66,6 +69,8 @@ class Schedule:
     bound: float | None
     sign: float
     seconds: float
+    judgement: Judgement | None = None
+    added: int = 0
 
     @property
     def gain(self) -> float | None:

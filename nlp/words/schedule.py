@@ -32,6 +32,11 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
     if schedule.bound is not None and schedule.gap is not None:
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"
         yield Line(words, label="bound", tone=Tone.HOLDS)
+    if schedule.proved is not None:
+        points = f"{schedule.added} point{'s' * (schedule.added != 1)} added"
+        verdict = "no singularity and no violated limit at any point of the path"
+        words, tone = (verdict, Tone.HOLDS) if schedule.proved else ("not proved along the path", Tone.NO_ANSWER)
+        yield Line(f"{words} ({points})", label="schedule proved" if schedule.proved else "schedule", tone=tone)
     rows: list[tuple[str | Line, ...]] = []
     for k, (each, unit) in enumerate(zip(schedule.names, schedule.units, strict=True)):
         column = [row[k] for row in schedule.rows]

@@ -149,28 +149,33 @@ class ToleranceLayout(NamedTuple):
             coordinates.
         built: the robot with joint-centre errors.
         tolerance: largest norm of each joint-centre error, length.
+        posed: number of coordinates of the pose that vary.
+        settings: number of dimensions that change along a path. They are the first variables, but follow the pose among
+            the coordinates of a search.
     """
 
     layout: Layout
     built: BuiltModel
     tolerance: float
+    posed: int = 0
+    settings: int = 0
 
     @property
     def errors(self) -> SX:
         """Symbols (3 m, 1) of the joint-centre errors."""
-        return self.layout.table.variables_vector[: 3 * len(self.built.names)]
+        return self.layout.table.variables_vector[self.settings : self.settings + 3 * len(self.built.names)]
 
     @property
     def pose(self) -> SX:
-        """Symbols (n, 1) of the pose and of the unknowns."""
+        """Symbols (n, 1) of the pose and of the unknowns, for a robot whose dimensions are fixed."""
         return self.layout.table.variables_vector[3 * len(self.built.names) :]
 
     def of(self, expression: SX, errors: SX, pose: SX) -> SX:
-        """Return an expression (k, 1) with other symbols or values for the errors and the pose."""
-        table = self.layout.table
+        """Return an expression (k, 1) with other symbols or values for the errors and the coordinates of a search."""
+        table, first, last = self.layout.table, self.posed, self.posed + self.settings
         function = ca.Function("numbers", [table.variables_vector, table.arguments_vector], [expression])
         numbers = ca.vertcat(SX(0, 1), *[SX(each) for each in table.values])
-        return function.call([ca.vertcat(errors, pose), numbers])[0]
+        return function.call([ca.vertcat(pose[first:last], errors, pose[:first], pose[last:]), numbers])[0]
 
     def near_zero(self, expression: SX, design: Layout) -> FloatArray:
         """Return smoothing terms (m,) for the norms of the derivatives g_j of an expression (1, 1).
@@ -203,7 +208,9 @@ def tolerance_layout(case: Case, built: BuiltModel, tolerance: float, at: PoseCo
     # Joints keep the mounting axes of the nominal robot.
     limits = Limits(*(_mounted(case, each) for each in case.limits))
     robots = replace(case, model=built.model, parameters=parameters | own, limits=limits, joint_centre_tolerance=None)
-    return ToleranceLayout(coordinate_layout(robots, at), built, tolerance)
+    posed = sum(isinstance(value, Free) for value in at.values)
+    changing = sum(isinstance(value, Free) for name in parameters for value in case.components(name))
+    return ToleranceLayout(coordinate_layout(robots, at), built, tolerance, posed, changing)
 
 
 def _mounted(case: Case, limit: Limit[Any]) -> Limit[Any]:

@@ -9,6 +9,7 @@ from ...case.case import Case
 from ...path.options import PathOptions
 from ...path.path import ProgrammedPath
 from ...path.reader import path_of_case, read_path
+from ...path.settings import changing_of
 from .judgement import Judgement
 from .path_judge import GAP, TIME_LIMIT, judge_path
 
@@ -46,5 +47,5 @@ def check_path(
     if path is None:
         path = path_of_case(case, options)
     elif not isinstance(path, ProgrammedPath):
-        path = read_path(path, case.units, options)
+        path = read_path(path, case.units, options, changing_of(case))
     return judge_path(case, path, gap=gap, time_limit=time_limit, progress=progress)

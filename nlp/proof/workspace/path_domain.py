@@ -47,10 +47,12 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
     arcs[k] = path.arcs
     axes[k] = [PLANES[plane] for plane in path.planes.tolist()] if len(k) else np.zeros((0, 3), dtype=np.intp)
     seconds = np.where(np.isfinite(path.durations), path.durations, np.inf)
-    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds, path.frame)
+    settings = path.settings
+    cover = PathCover(path.knots[:, :3], arcs, axes, turns, seconds, path.frame, settings.values)
     lower, upper = cover.boxes(cover.pieces)
     low, high = lower.min(axis=0), upper.max(axis=0)
-    if not (high > low).any():  # a path that stays at one pose
+    of_pose = len(low) - len(settings.names)
+    if not (high > low)[:of_pose].any():  # a path that stays at one pose
         room = _ROOM * max(float(np.abs(path.knots[:, :3]).max()), size)
         low[0], high[0] = low[0] - room, high[0] + room
     box = PoseBox(
@@ -60,10 +62,11 @@ def covered(path: ProgrammedPath, size: float) -> tuple[PathCover, PoseBox, Work
         frozen_array(high, high.shape),
         math.inf,
         turns.reference,
+        settings=settings.names,
     )
     about = Turns(TurnKind.ANY_AXIS, (Free(-LARGEST_TURN, LARGEST_TURN),))
     if turns.kind is TurnKind.ROLL_PITCH_YAW:
-        about = Turns(turns.kind, tuple(_values(2 * np.arctan(low[3:]), 2 * np.arctan(high[3:]))))
+        about = Turns(turns.kind, tuple(_values(2 * np.arctan(low[3:6]), 2 * np.arctan(high[3:6]))))
     return cover, box, Workspace(_values(low[:3], high[:3]), about)
 
 

@@ -30,12 +30,12 @@ from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses
 from ...case.task import LEG_LENGTH, Task
 from ...errors import CaseError
-from ...path.reader import path_of_case
+from ...path.reader import path_without_settings
 from ...path.waypoints import Waypoints, waypoints
 from ...program.layout import reference_of
 
-#: Numbers of a point: position, rotation matrix column by column, unit vector of the feed.
-_POINT = 15
+#: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
+_POINT = 16
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
 
@@ -84,6 +84,7 @@ class ScheduleProblem:
         limits: (c, 1) limits as expressions that must be at most 0.
         of_design: (b, 1) limits of the design alone, at most 0.
         names: names of the limits.
+        margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
     """
 
     case: Case
@@ -96,6 +97,7 @@ class ScheduleProblem:
     limits: SX
     of_design: SX
     names: tuple[str, ...]
+    margins: FloatArray | None = None
 
     @property
     def sign(self) -> float:
@@ -117,7 +119,8 @@ class ScheduleProblem:
         """Numbers (m, N) of the points."""
         points = self.points
         rotations = points.rotations.transpose(0, 2, 1).reshape(len(points), 9)
-        return np.ascontiguousarray(np.hstack([points.positions, rotations, points.feeds]).T)
+        margins = np.zeros(len(points)) if self.margins is None else self.margins
+        return np.ascontiguousarray(np.hstack([points.positions, rotations, points.feeds, margins[:, None]]).T)
 
     @cached_property
     def steps(self) -> FloatArray:
@@ -187,7 +190,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
-    points = waypoints(path_of_case(case))
+    points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
     model = closed.model
@@ -233,7 +236,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         weights=np.array(weights),
         symbols=(d, s, point),
         objective=case.tasks[0].sense.sign * values,
-        limits=ca.vertcat(SX(0, 1), *[row for _, row in at_points]),
+        limits=ca.vertcat(SX(0, 1), *[row + point[15] for _, row in at_points]),
         of_design=ca.vertcat(SX(0, 1), *[row for (_, row), own in zip(rows, varying, strict=True) if not own]),
         names=tuple(name for name, _ in at_points),
     )

@@ -30,6 +30,7 @@ from ..solution import Solution
 from ..status import Status
 from .cells import cell_bound, check_certified
 from .dynamic import constants, seeds
+from .exchange import ProvedSchedule, exchanged
 from .polish import Polished, polish
 from .problem import ScheduleProblem, ends, schedule_problem
 
@@ -89,8 +90,18 @@ def solve_schedule(
         found += _schedules(problem, best.d, [] if constant is None else [constant], fine=True)
         best = max(found, key=lambda each: each.value)
     constant = max(fixed, key=lambda each: each.value, default=None)
+    proved = exchanged(problem, best) if case.limits_over else None
+    if proved is not None:
+        best = _at_stated_points(problem, proved)
     bound = None if gap is None else cell_bound(problem, best.d, best.value, gap).bound
-    return _solution(problem, best, constant, bound, began, search)
+    return _solution(problem, best, constant, bound, began, search, proved)
+
+
+def _at_stated_points(problem: ScheduleProblem, proved: ProvedSchedule) -> Polished:
+    """Return a schedule that was solved at further points, at the points of the problem, with its objective there."""
+    new, old = (each.points.points.segments + each.points.points.parameters for each in (proved.problem, problem))
+    s = proved.schedule.s[np.isin(new, old)]
+    return Polished(proved.schedule.d, s, problem.value(proved.schedule.d, s))
 
 
 def _designs(problem: ScheduleProblem, search: Search) -> list[FloatArray]:
@@ -132,6 +143,7 @@ def _solution(
     bound: float | None,
     began: float,
     search: Search,
+    proved: ProvedSchedule | None = None,
 ) -> Solution:
     """Return the solution: the robot at the first point of the path, with its schedule."""
     case, sign = problem.case, problem.sign
@@ -139,6 +151,8 @@ def _solution(
     start = at_first_point(problem, d, s)
     own = solve_program(formulate(start), replace(search, starts=1), jobs=1)
     status = Status.INFEASIBLE if best is None else Status.LOCAL
+    if proved is not None and not proved.judgement.is_proved:
+        status = Status.INTERRUPTED if is_requested() else Status.NOT_PROVED
     seconds = time.perf_counter() - began
     own = replace(own, status=status, seconds=seconds)
     found = replace(solution_of_one_task(start, own), case=case, status=status, seconds=seconds)
@@ -147,14 +161,16 @@ def _solution(
     units = case.units
     unit = np.array([units.shown(1.0, each.dimension) for each in problem.settings])
     held = None if constant is None else ConstantSetting(constant.s[0] * unit, sign * constant.value)
+    # Rows at the further points keep the limits between the points of the problem.
+    shown, rows = (problem, best) if proved is None else (proved.problem, proved.schedule)
     schedule = Schedule(
         names=tuple(each.name for each in problem.settings),
         dimensions=tuple(each.dimension for each in problem.settings),
         units=units,
-        values=best.s * unit,
-        times=problem.points.times,
-        poses=Poses(problem.points.positions, problem.points.rotations),
-        F=sign * problem.combined(problem.at(best.d, best.s).objective),
+        values=rows.s * unit,
+        times=shown.points.times,
+        poses=Poses(shown.points.positions, shown.points.rotations),
+        F=sign * shown.combined(shown.at(rows.d, rows.s).objective),
         over=case.over_path or OverPoses.MEAN,
         value=sign * best.value,
         constant=held,
@@ -166,6 +182,8 @@ def _solution(
         bound=None if bound is None else sign * bound,
         sign=sign,
         seconds=seconds,
+        judgement=None if proved is None else proved.judgement,
+        added=0 if proved is None else proved.added,
     )
     return replace(found, schedule=schedule)
 

@@ -10,7 +10,8 @@ expressions. Positions are on lines, or ``centre + (r + s g) (cos, sin)(a + s w)
 
       (1 - s) sinc((1 - s) h) q_0 + s sinc(s h) q_1 = (sin h / h) times a unit quaternion.
 
-A frame rotates positions, and multiplies quaternions from the left. An arc may miss the knots at its ends: the gap is
+A frame rotates positions, and multiplies quaternions from the left. A turn about the tool's axis, by an angle that
+changes linearly, multiplies them from the right. An arc may miss the knots at its ends: the gap is
 part of the remainder of a piece that reaches such an end.
 """
 
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import reduce
+from functools import cached_property, reduce
 
 import casadi as ca
 import numpy as np
@@ -41,6 +42,8 @@ _LARGEST = math.radians(149)
 _TERMS, _SERIES = 12, 4e-15
 #: Rounding of half an angle computed from two unit quaternions.
 _HALF = 1e-14
+#: Error of the components of a unit vector in doubles, with the factors around it.
+_AXIS = 2.0**-50
 #: Number of data of an arc.
 _ARC = 6
 #: Number of places on each segment, and on the first turn of an arc with several turns, for the ranges of coordinates.
@@ -62,7 +65,9 @@ class PathPoses:
     def __init__(self, path: ProgrammedPath) -> None:
         self._path, angles, frame = path, path.knots[:, 3:], path.frame
         self._is_slerp = path.between is Between.SLERP
-        is_direct = frame is None and not self._is_slerp and path.order == ORDERS["rpy"]
+        # A tool that never turns is left out, as are angles that are 0 along the whole path.
+        self._tool = None if path.tool is None or not path.tool.angles.any() else path.tool
+        is_direct = frame is None and self._tool is None and not self._is_slerp and path.order == ORDERS["rpy"]
         self.is_tangents = bool(is_direct and np.abs(angles).max() < _LARGEST)
         # Angles that are 0 along the whole path make components of quaternions exactly 0.
         self._turning = [bool(angles[:, k].any()) for k in range(3)]
@@ -99,8 +104,9 @@ class PathPoses:
         place = np.zeros(6) if frame is None else np.concatenate([frame.origin, frame.angles])
         placed = np.broadcast_to(place[:, None], (6, len(path)))
         exact = np.zeros((sum(map(len, positions)), len(path)))
-        return np.concatenate([*positions, *turns, placed]), np.concatenate(
-            [exact, *(off or [np.zeros((6, len(path)))]), np.zeros(placed.shape)]
+        angles = [] if self._tool is None else [self._tool.angles[None, :-1], self._tool.angles[None, 1:]]
+        return np.concatenate([*positions, *turns, placed, *angles]), np.concatenate(
+            [exact, *(off or [np.zeros((6, len(path)))]), np.zeros(placed.shape), *map(np.zeros_like, angles)]
         )
 
     def _quaternions(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -160,6 +166,12 @@ class PathPoses:
             turned = _rotation(quaternion) @ ca.vertcat(*position)
             position = [each + origin for each, origin in zip(ca.vertsplit(turned), place[:3], strict=True)]
             turns = _product(quaternion, turns)
+        if self._tool is not None:
+            first, last = take(2)
+            half = 0.5 * (first + s * (last - first))
+            # Components that are zero stay exactly zero.
+            about = [SX(each) * ca.sin(half) if each else SX(0) for each in self._tool.axis.tolist()]
+            turns = _product(turns, [ca.cos(half), *about])
         return ca.vertcat(*position, *turns), gaps
 
     def _turn(self, s: SX, numbers: Sequence[SX]) -> list[SX]:
@@ -216,19 +228,27 @@ class PathPoses:
             for j, each in enumerate(found):
                 P[j][:, rows], s[j, rows], V[j][:, rows] = each.spread((0,)), each.s, each.V
                 if j < count:
-                    off = gap + self._off(self.varying[j])
-                    s[j, rows] += off
-                    V[j][:, rows] += [[-1.0], [1.0]] * off
-                elif self._is_slerp:
-                    s[j, rows] += _SERIES
-                    V[j][:, rows] += [[-_SERIES], [_SERIES]]
+                    off = gap + self._off(self.varying[j], k[rows])
+                else:
+                    off = _SERIES * self._is_slerp + self._tool_off[k[rows]]
+                s[j, rows] += off
+                V[j][:, rows] += [[-1.0], [1.0]] * off
         s[:, ~((ends[0] >= 0) & (ends[1] <= 1))] = np.nan
         every = [settled((0,), *each) for each in zip(P, s, V, strict=True)]
         return every[:count], every[count:]
 
-    def _off(self, coordinate: int) -> float:
-        """Return the error of a coordinate that its expression does not contain: that of the series for quaternions."""
-        return _SERIES if self._is_slerp and coordinate >= POSITION else 0.0
+    def _off(self, coordinate: int, segments: NDArray[np.intp]) -> FloatArray:
+        """Return errors (B,) of a coordinate that its expression does not contain: of the series, and of the axis."""
+        return (_SERIES * self._is_slerp + self._tool_off[segments]) * (coordinate >= POSITION)
+
+    @cached_property
+    def _tool_off(self) -> FloatArray:
+        """Errors (N,) of quaternions and their derivatives by the rounding of the tool's axis; 0 for an exact axis."""
+        tool, path = self._tool, self._path
+        if tool is None or set(np.abs(tool.axis).tolist()) <= {0.0, 1.0}:
+            return np.zeros(len(path))
+        rates = np.abs(np.diff(path.knots[:, 3:], axis=0)).sum(axis=1) + np.abs(np.diff(tool.angles))
+        return np.asarray(_AXIS * (1 + rates))
 
     def segments(self, lower: FloatArray, upper: FloatArray) -> NDArray[np.intp]:
         """Return the segments (B,) of pieces, by their middles; a knot belongs to the segment that begins there.

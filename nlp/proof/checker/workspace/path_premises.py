@@ -7,6 +7,7 @@ from ....errors import CaseError, InputError
 from ....path.options import PathOptions
 from ....path.path import ProgrammedPath
 from ....path.reader import in_place_of_case, is_table, path_of_text
+from ....path.settings import changing_of
 from ...statement.fixed_robot import legs_of
 from ..proof_file import LARGEST_CASE, PathPremises, ProofError
 from .statement import legs_premise
@@ -69,7 +70,7 @@ def carried_path(case: Case, given: PathPremises) -> ProgrammedPath:
         ProofError: the proof has no readable path, or the case has no path.
     """
     try:
-        path = path_of_text(given.text, given.file, case.units, PathOptions.stated_in(given))
+        path = path_of_text(given.text, given.file, case.units, PathOptions.stated_in(given), changing_of(case))
     except (InputError, ValueError) as error:
         raise ProofError(f"the path in the proof cannot be read: {error}") from None
     if not given.of_case:

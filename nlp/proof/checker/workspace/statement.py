@@ -21,6 +21,7 @@ from ....case.task import Sense
 from ....case.workspace import Workspace
 from ....errors import InputError
 from ....path.path import ProgrammedPath
+from ....path.settings import case_along
 from ....program.layout import Layout
 from ...statement.claims import (
     ACTUATED,
@@ -184,6 +185,7 @@ def case_along_path(case: Case, path: ProgrammedPath) -> Case:
     """
     if not len(path):
         raise InputError(f"{path.source}: has no motion")
+    case = case_along(case, path.settings)
     case.fixed_parameters("a path is judged with fixed dimensions")
     check_determined_joints(case.model, "path", case.source)
     if not path.is_timed:

@@ -83,6 +83,12 @@ class Motors(Number):
             # A leg's speed follows from its row of J, and its force from its column of the solution.
             row = [each.limb for each in posed.limbs.wrenches].index(motor.actuator)
             row_of_leg, D = posed.scaled.jacobian[row, :].T, D[:, row]
+            if problem.rates and problem.of_settings:
+                # The length also changes by the dimensions: one more component, whose rate is 1.
+                of_settings = problem.of_settings
+                length = ca.sqrt(posed.plain(posed.limbs.wrenches[row].square))
+                rates = problem.z[list(problem.rates)[-len(of_settings) :], :]
+                row_of_leg = ca.vertcat(row_of_leg, ca.jtimes(length, problem.z[of_settings, :], rates))
         self._column = 0 if D.shape[1] == 1 else self._actuator
         free, loading = problem.free, self._loading
         is_ball = problem.box.is_ball
@@ -92,6 +98,8 @@ class Motors(Number):
         loads = [each.wrench(R) for each in loading.cases]
         scaled = [ca.vertcat(each[:3], each[3:] / problem.length) for each in loads]
         twist = path_twist(problem) if problem.rates else SX(6, 0)
+        if row_of_leg.numel() > 6:
+            twist = ca.vertcat(twist, 1)
         parts = [A, D, row_of_leg, twist, ca.horzcat(SX(3, 0), *arms), ca.horzcat(SX(6, 0), *scaled)]
         parts = [ca.densify(each) for each in (*parts, ca.horzcat(SX(1, 0), *turn))]
         self._shapes = [each.shape for each in parts]
@@ -116,7 +124,7 @@ class Motors(Number):
             x = np.linalg.norm(solved(A, D).c[:6, self._column], axis=0)
             fast = np.asarray(motion.linear + motion.angular * self._length)
             if twist.c.size:
-                fast = np.linalg.norm(twist.c[:3, 0], axis=0) + np.linalg.norm(twist.c[3:, 0], axis=0)
+                fast = np.linalg.norm(twist.c[:3, 0], axis=0) + np.linalg.norm(twist.c[3:6, 0], axis=0)
             ends = [fast / x for _ in self._parts]
             for j, (sense, load) in enumerate(self._parts):
                 if sense is not None:
@@ -262,11 +270,12 @@ def path_twist(problem: Problem) -> SX:
         raise NotJudgedError(
             "the path does not determine the platform's twist, because some pose coordinates are dependent"
         )
-    rates = SX(6, 1)
+    box = problem.box
+    rates = SX(6 + len(box.settings), 1)
     rates[problem.rated] = problem.z[list(problem.rates), :]
-    if problem.box.kind is not TurnKind.ROLL_PITCH_YAW:
-        return ca.vertcat(rates[:3], problem.length * rates[3:])
-    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(problem.box.symbols(problem.z)[3:]))
+    if box.kind is not TurnKind.ROLL_PITCH_YAW:
+        return ca.vertcat(rates[:3], problem.length * rates[3:6])
+    _, b, c = (2 * ca.atan(t) for t in ca.vertsplit(box.symbols(problem.z)[3 : box.of_pose]))
     about_x = ca.vertcat(ca.cos(c) * ca.cos(b), ca.sin(c) * ca.cos(b), -ca.sin(b))
     about_y = ca.vertcat(-ca.sin(c), ca.cos(c), 0)
     omega = about_x * rates[3] + about_y * rates[4] + ca.vertcat(0, 0, rates[5])

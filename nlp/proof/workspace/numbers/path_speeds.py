@@ -1,8 +1,9 @@
 """Actuator speeds along a tool path with times.
 
-The rates w of the pose (rates of its coordinates, or its angular velocity) are coordinates of the search; each piece of
-the path determines their ranges. With the loop equations ``L(X, u) = 0`` for the passive joints u without a closed
-form, and ``X' = X'(X, w)``,
+The rates w of the pose (rates of its coordinates, or its angular velocity), and of dimensions that change along the
+path, are coordinates of the search; each piece of the path determines their ranges. X has the pose and these
+dimensions. With the loop equations ``L(X, u) = 0`` for the passive joints u without a closed form, and
+``X' = X'(X, w)``,
 
     L_u u' = -L_X X',        q' = q_X X' + q_u u'
 
@@ -101,17 +102,18 @@ class PathSpeeds(Number):
 
 
 def pose_rates(problem: Problem) -> SX:
-    """Return the rates (f, 1) of the pose's free coordinates, with tangents of half angles for angles.
+    """Return the rates (f, 1) of the free coordinates, with tangents of half angles for angles.
 
     Rates of dependent coordinates are 0 here: they follow from the loops.
     """
-    rates, y = SX(6, 1), problem.box.symbols(problem.z)
+    box, y = problem.box, problem.box.symbols(problem.z)
+    rates = SX(6 + len(box.settings), 1)
     rates[problem.rated] = problem.z[list(problem.rates), :]
-    velocity, turn, w = rates[:3], y[3:], rates[3:]
-    if problem.box.kind is TurnKind.ROLL_PITCH_YAW:
+    velocity, turn, w = rates[:3], y[3 : box.of_pose], rates[3:6]
+    if box.kind is TurnKind.ROLL_PITCH_YAW:
         turned = 0.5 * (1 + turn * turn) * w
     elif turn.numel() > 3:  # a quaternion of any norm, which may change along itself
         turned = 0.5 * ca.vertcat(-ca.dot(w, turn[1:]), turn[0] * w + ca.cross(w, turn[1:]))
     else:
         turned = 0.5 * (w + ca.cross(w, turn) + ca.dot(w, turn) * turn)
-    return ca.vertcat(velocity, turned)[list(problem.free), :]
+    return ca.vertcat(velocity, turned, rates[6:])[list(problem.free), :]

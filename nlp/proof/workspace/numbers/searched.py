@@ -95,6 +95,8 @@ class Subject:
     def number(self, claim: Claim) -> SingularValues | Clearance:
         """Return the quantity of a claim about a clearance or a singular value, negated for a largest value."""
         if claim.kind is ClaimKind.CLEARANCE:
+            if self.problem.of_settings:
+                raise NotJudgedError("leg clearances are not verified while a dimension changes along the path")
             if self.legs.tolerance and self.problem.has_following:
                 raise NotJudgedError("dependent pose coordinates differ between robots within the tolerance")
             return Clearance(self.problem, self.legs, claim.legs)
@@ -103,7 +105,7 @@ class Subject:
     def spectrum(self, length: float, *, is_condition: bool) -> SingularValues:
         """Return the smallest singular value of J, or its negative condition number."""
         problem = self.problem
-        if not (self.legs.tolerance and has_straight_legs(self.case.model)):
+        if not (self.case.joint_centre_tolerance and has_straight_legs(self.case.model)):
             return SingularValues(self.family or problem, length, is_condition=is_condition)
         # For six straight legs the change of J by joint-centre errors has a special bound.
         change = change_of_rows(self.legs, length, self.shortest)

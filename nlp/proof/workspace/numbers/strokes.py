@@ -11,7 +11,7 @@ import numpy as np
 from .....models import FloatArray
 from ....case.task import Sense
 from ...statement.claims import Claim, length_claims
-from ...statement.fixed_robot import JointErrors
+from ...statement.fixed_robot import JointErrors, Legs
 from ...statement.tolerance import Directions
 from ..robot.pose_box import PoseNumbers
 from ..robot.posed_robot import steepest
@@ -63,8 +63,13 @@ class _Combined:
     """
 
     def __init__(self, subject: Subject, claim: Claim, refine: Refine) -> None:
-        self._subject, self._claim, self._refine, self._legs = subject, claim, refine, subject.legs
+        self._subject, self._claim, self._refine = subject, claim, refine
         (self._leg,), self._factors, self._sign = claim.legs, np.array(claim.weights[::-1]), claim.sense.sign
+
+    @property
+    def _legs(self) -> Legs:
+        """Joint centres of the legs, for a robot whose dimensions are fixed."""
+        return self._subject.legs
 
     def refined(self, ends: list[Verdict]) -> tuple[list[Verdict], Verdict]:
         """Return the verdicts on both lengths, with the gap that the limit requires, and on their combination."""
@@ -107,7 +112,7 @@ class _Combined:
         Also return the joint-centre errors of this robot; None for the nominal robot.
         """
         poses = [each.pose for each in ends if each.pose is not None]
-        if not self._legs.tolerance or len(poses) < len(ends):
+        if not self._subject.case.joint_centre_tolerance or len(poses) < len(ends):
             return float(self._factors @ [each.reached for each in ends]), None
         if self._subject.family is None or self._subject.family.has_following:
             # The two poses belong to different robots.

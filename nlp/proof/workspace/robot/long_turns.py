@@ -9,9 +9,9 @@ different divisors meet, they have two quaternions of the same rotation.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,7 @@ from .path_turns import (
     varying,
 )
 from .pose_box import UNTURNED, Reference
+from .tool_turns import ToolTurns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -141,52 +142,68 @@ def turns_of_path(path: ProgrammedPath) -> PathTurns:
         InputError: the path has too many turns.
     """
     angles, is_slerp, frame = path.knots[:, 3:], path.between is Between.SLERP, path.frame
-    held = None if frame is None else _held(angles, path.order, frame)
+    tool = path.tool if path.tool is not None and path.tool.angles.any() else None
+    held = None if frame is None or tool is not None else _held(angles, path.order, frame)
     if held is not None:
         return held
-    if frame is None and not is_slerp and path.order == ORDERS["rpy"] and np.abs(angles).max() < _LARGEST:
+    is_direct = frame is None and tool is None and not is_slerp and path.order == ORDERS["rpy"]
+    if is_direct and np.abs(angles).max() < _LARGEST:
         return Tangents(angles)
-    order, change = path.order, np.diff(angles, axis=0)
-    if is_slerp:
-        quaternions = in_world(quaternions_from_angles(angles, order), frame)
-        axes, width = shortest_turns(quaternions[:-1], quaternions[1:])
-        # A rotation has two quaternions; the one nearer to the preceding quaternion is taken.
-        flips = (quaternions[:-1] * quaternions[1:]).sum(axis=1) < 0
-        quaternions[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
-        off = (1 if frame is None else 2) * ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
-        every, turning = quaternions, turning_in_world(varying(angles, order, UNTURNED), frame)
+    of_task = _shortest_turns(path) if is_slerp else partial(LinearAngles, angles, path.order, frame=frame)
+    if tool is not None:
+        task = of_task(UNTURNED)
+        units = frozenset({0, *(np.flatnonzero(varying(angles, path.order, UNTURNED, frame)) + 1).tolist()})
+        return _about_references(path, partial(ToolTurns, task, tool, units=units))
+    return _about_references(path, of_task)
 
-        def turns(reference: Reference) -> PathTurns:
-            own, vary = relative(quaternions, reference), varying(angles, order, reference, frame)
-            return ShortestTurns(own, off, 0.5 * width, width[:, None] * axes * turning, vary, turning, reference)
-    else:
-        width = np.abs(change).sum(axis=1)
-        if np.ceil(width / CHORD).sum() > _MOST + len(path):
-            line = path.lines[int(np.argmax(width))]
-            fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in total, mostly on this line"
-            raise InputError(
-                f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are allowed"
-            )
-        rows, parts = divided(np.tile([0.0, 1.0], (len(path), 1)), np.ceil(width / CHORD))
-        points = np.append(angles[rows] + parts[:, :1] * change[rows], angles[-1:], 0)
-        every = in_world(quaternions_from_angles(points, order), frame)
 
-        def turns(reference: Reference) -> PathTurns:
-            return LinearAngles(angles, order, reference, frame)
+def _shortest_turns(path: ProgrammedPath) -> Callable[[Reference], ShortestTurns]:
+    """Return the rotations of a path about fixed axes, as a function of the reference."""
+    angles, order, frame = path.knots[:, 3:], path.order, path.frame
+    quaternions = in_world(quaternions_from_angles(angles, order), frame)
+    axes, width = shortest_turns(quaternions[:-1], quaternions[1:])
+    # A rotation has two quaternions; the one nearer to the preceding quaternion is taken.
+    flips = (quaternions[:-1] * quaternions[1:]).sum(axis=1) < 0
+    quaternions[1:] *= np.where(np.cumsum(flips) % 2, -1.0, 1.0)[:, None]
+    off = (1 if frame is None else 2) * ROUNDED + PER_RADIAN * np.abs(angles).sum(axis=1)
+    turning = turning_in_world(varying(angles, order, UNTURNED), frame)
 
+    def turns(reference: Reference) -> ShortestTurns:
+        own, vary = relative(quaternions, reference), varying(angles, order, reference, frame)
+        return ShortestTurns(own, off, 0.5 * width, width[:, None] * axes * turning, vary, turning, reference)
+
+    return turns
+
+
+def _about_references(
+    path: ProgrammedPath, turns: Callable[[Reference], ShortestTurns | LinearAngles | ToolTurns]
+) -> PathTurns:
+    """Return rotations relative to one reference, or to one for each part of a segment.
+
+    Args:
+        path: the path.
+        turns: function from a reference to the rotations.
+
+    Raises:
+        InputError: the path has too many turns.
+    """
+    own = turns(UNTURNED)
+    width = own.widths
+    if not isinstance(own, ShortestTurns) and np.ceil(width / CHORD).sum() > _MOST + len(path):
+        line = path.lines[int(np.argmax(width))]
+        fault = f"angles change by {math.degrees(float(width.sum())):.4g} degrees in total, mostly on this line"
+        raise InputError(f"{path.source}: line {line}: {fault}; at most {math.degrees(_MOST * CHORD):.4g} are allowed")
+    chord = np.zeros(len(path)) if isinstance(own, ShortestTurns) else np.ceil(width / CHORD)
+    rows, parts = divided(np.tile([0.0, 1.0], (len(path), 1)), chord)
+    last = own.quaternions(np.array([len(path) - 1]), np.ones(1))
+    every = np.append(own.quaternions(rows, parts[:, 0]), last, 0)
     reference = _reference(every)
     scalars = relative(every, reference)[:, 0]
     if np.abs(scalars).min() > _LEAST and np.ptp(np.sign(scalars)) == 0:
         return turns(reference)
     counts = np.maximum(np.ceil(width / _PART), 1).astype(int)
     rows, parts = divided(np.tile([0.0, 1.0], (len(path), 1)), counts.astype(float))
-    s = parts.mean(axis=1, keepdims=True)
-    if is_slerp:
-        middles = np.sin((1 - s) * 0.5 * width[rows, None]) * every[rows]
-        middles += np.sin(s * 0.5 * width[rows, None]) * every[rows + 1]
-        middles = np.where(width[rows, None] > 0, middles, every[rows])
-    else:
-        middles = in_world(quaternions_from_angles(angles[rows] + s * change[rows], order), frame)
+    middles = own.quaternions(rows, parts.mean(axis=1))
     return LongTurns([turns(each) for each in _UNITS], counts, np.argmax(np.abs(middles), axis=1))
 
 

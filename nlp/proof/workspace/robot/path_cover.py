@@ -1,5 +1,7 @@
 """Boxes of poses that cover pieces of a tool path, in the coordinates of a :class:`~.pose_box.PoseBox`.
 
+Dimensions that change along the path are further coordinates. They are linear functions of the parameter.
+
 Positions on a line are monotone. Positions on an arc are products of a radius and of cosines over ranges. In a rotated
 frame, a coordinate ``u cos a + v sin a`` of a circle is again a cosine, ``hypot(u, v) cos(a - atan2(v, u))``, and a
 helix adds its height. Ends move outwards by several roundings. Ranges of rotations come from :mod:`.path_turns`.
@@ -87,6 +89,7 @@ class PathCover:
         turns: rotations along the path.
         seconds: (N,) durations of the segments; infinite (standstill) for segments without a known duration.
         frame: frame of the path in the world; None if it is the world frame.
+        settings: (N + 1, k) dimensions that change along the path, at the knots.
     """
 
     knots: FloatArray
@@ -95,6 +98,7 @@ class PathCover:
     turns: PathTurns
     seconds: FloatArray
     frame: PathFrame | None = None
+    settings: FloatArray | None = None
 
     @cached_property
     def pieces(self) -> FloatArray:
@@ -145,7 +149,17 @@ class PathCover:
                 at = arcs[s[:, index] == index]
                 low[at], high[at] = np.minimum(low[at], (knots - off)[at]), np.maximum(high[at], (knots + off)[at])
         turns = self.turns.boxes(k, pieces[:, 1:], None if within is None else within[:, 1:])
-        return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
+        settings = self._settings(k, pieces[:, 1:])
+        return np.hstack([low, turns[0], settings[0]]), np.hstack([high, turns[1], settings[1]])
+
+    def _settings(self, k: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, d) of the dimensions over pieces of segments (B,) between ends (B, 2)."""
+        if self.settings is None:
+            return np.zeros((len(k), 0)), np.zeros((len(k), 0))
+        start, change = self.settings[k], self.settings[k + 1] - self.settings[k]
+        low, high = np.sort([start + s[:, None] * change for s in ends.T], axis=0)
+        slack = np.where(change == 0, 0.0, _OUTWARDS * (np.abs(start) + np.abs(change)))
+        return low - slack, high + slack
 
     def _in_world(self, knots: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
         """Return positions (B, 3) of knots in the world frame, and bounds of the rounding errors of the conversion."""
@@ -187,10 +201,10 @@ class PathCover:
             )
 
     def derivatives(self, pieces: FloatArray, order: int = 1) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (B, 6) of the derivatives of the pose with respect to the parameter, over pieces (B, 3).
+        """Return bounds (B, 6 + d) of derivatives with respect to the parameter, over pieces (B, 3).
 
         The rows contain derivatives of positions, then derivatives of roll, pitch and yaw or angular velocities in the
-        world frame.
+        world frame, then derivatives of the dimensions that change.
 
         Args:
             pieces: indices of segments, and both ends of the parameter.
@@ -225,10 +239,14 @@ class PathCover:
                 at = arcs[row.which], row.axis
                 low[at] = one.min(axis=1) + other.min(axis=(1, 2)) + rise - slack
                 high[at] = one.max(axis=1) + other.max(axis=(1, 2)) + rise + slack
-        return np.hstack([low, turns[0]]), np.hstack([high, turns[1]])
+        resets = np.zeros((len(k), 0))
+        if self.settings is not None:
+            resets = (self.settings[k + 1] - self.settings[k]) * (order == 1)
+        slack = _OUTWARDS * np.abs(resets)
+        return np.hstack([low, turns[0], resets - slack]), np.hstack([high, turns[1], resets + slack])
 
     def rates(self, pieces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return bounds (B, 6) of the derivatives of the pose with respect to time, per second, over pieces (B, 3)."""
+        """Return bounds (B, 6 + d) of derivatives with respect to time, per second, over pieces (B, 3)."""
         seconds = self.seconds[pieces[:, 0].astype(int), None]
         low, high = (each / seconds for each in self.derivatives(pieces))
         return low - _OUTWARDS * np.abs(low), high + _OUTWARDS * np.abs(high)

@@ -19,7 +19,7 @@ import numpy as np
 
 from .....models import FloatArray
 from ....case.workspace import TurnKind
-from ....path.orientation import Order, quaternion_products, quaternions_from_angles
+from ....path.orientation import Order, quaternion_products, quaternions_from_angles, shortest_turns, turned
 from .pose_box import UNTURNED, Reference
 
 if TYPE_CHECKING:
@@ -77,6 +77,19 @@ class PathTurns(Protocol):
         ...
 
 
+class TurnsAtRates(Protocol):
+    """Rotations of a path whose quaternions are products of factors that turn at constant rates in each segment."""
+
+    @property
+    def widths(self) -> FloatArray:
+        """Sums (N,) of the changes of all angles over each segment, radians."""
+        ...
+
+    def quaternions(self, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
+        """Return the quaternions (B, 4), relative to the reference, at parameters (B,) of segments (B,)."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Tangents:
     """Roll, pitch and yaw that change linearly, as tangents of their halves.
@@ -119,7 +132,7 @@ class ShortestTurns:
     """Turns about fixed axes as Cayley vectors.
 
     Attributes:
-        quaternions: (N + 1, 4) quaternions at the knots, relative to the reference; each near the one before.
+        knots: (N + 1, 4) quaternions at the knots, relative to the reference; each near the one before.
         off: (N + 1,) error bounds of the quaternions.
         halves: (N,) half angles of the turns, radians.
         velocities: (N, 3) axes in the world frame times the angles.
@@ -127,7 +140,7 @@ class ShortestTurns:
         reference: reference of the Cayley vectors.
     """
 
-    quaternions: FloatArray
+    knots: FloatArray
     off: FloatArray
     halves: FloatArray
     velocities: FloatArray
@@ -157,7 +170,16 @@ class ShortestTurns:
         """Return quaternions (2, B, 4) at ends of pieces, of norm at most 1."""
         half = self.halves[segments, None]
         before, after = ((s * _sine_ratio(s * half)).T[:, :, None] for s in (1 - ends, ends))
-        return np.asarray(before * self.quaternions[segments] + after * self.quaternions[segments + 1])
+        return np.asarray(before * self.knots[segments] + after * self.knots[segments + 1])
+
+    @cached_property
+    def widths(self) -> FloatArray:
+        """Angles (N,) of the turns, radians."""
+        return np.asarray(2 * self.halves)
+
+    def quaternions(self, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
+        """Return the quaternions (B, 4), relative to the reference, at parameters (B,) of segments (B,)."""
+        return turned_between(self.knots[segments], self.knots[segments + 1], s)
 
     def _off(self, segments: NDArray[np.intp]) -> FloatArray:
         """Return error bounds (B,) of quaternions and angular velocities over pieces, from errors at both knots."""
@@ -188,12 +210,23 @@ class LinearAngles:
     counts = None
 
     @cached_property
+    def widths(self) -> FloatArray:
+        """Sums (N,) of the changes of the angles over each segment, radians."""
+        return np.asarray(np.abs(np.diff(self.angles, axis=0)).sum(axis=1))
+
+    def quaternions(self, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
+        """Return the quaternions (B, 4), relative to the reference, at parameters (B,) of segments (B,)."""
+        start = self.angles[segments]
+        angles = start + s[:, None] * (self.angles[segments + 1] - start)
+        return relative(in_world(quaternions_from_angles(angles, self.order), self.frame), self.reference)
+
+    @cached_property
     def _vary(self) -> FloatArray:
         """0 for coordinates (3,) that are zero at all points; else 1."""
         return varying(self.angles, self.order, self.reference, self.frame)
 
     @cached_property
-    def _rounded(self) -> float:
+    def rounded(self) -> float:
         """Error bound of a quaternion of exact angles; with a frame, the quaternion is a product of one more factor."""
         return ROUNDED if self.frame is None else 2 * ROUNDED
 
@@ -204,22 +237,9 @@ class LinearAngles:
         within: FloatArray | None = None,  # noqa: ARG002
     ) -> tuple[FloatArray, FloatArray]:
         """Return ranges over pieces; see :class:`PathTurns`."""
-        change = self.angles[segments + 1] - self.angles[segments]
-        width = np.abs(change).sum(axis=1) * (ends[:, 1] - ends[:, 0])
-        rows, parts = divided(ends, np.ceil(width / CHORD))
-        start, change = self.angles[segments[rows]], change[rows]
-        each = [start + s[:, None] * change for s in parts.T]
-        own = [in_world(quaternions_from_angles(at, self.order), self.frame) for at in each]
-        quaternions = np.stack([relative(at, self.reference) for at in own])
-        off = self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
-        # A quaternion's derivative is at most half the sum of the angles' rates, its second derivative that squared.
-        bend = (0.5 * np.abs(change).sum(axis=1) * (parts[:, 1] - parts[:, 0])) ** 2 / 8 * _UP
-        least = np.abs(quaternions[:, :, 0]).min(axis=0) - bend - off
-        with np.errstate(divide="ignore"):
-            slack = _vector_slack(off, least) + bend * (1 / least**2 + 2 / least**3) * _UP
-        low, high = _hull(quaternions, least, slack, self._vary)
-        first = np.flatnonzero(np.diff(rows, prepend=-1))
-        return np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
+        start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
+        off = self.rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
+        return chord_hull(self, segments, ends, off, self._vary)
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return angular velocities over pieces; see :class:`PathTurns`."""
@@ -228,13 +248,44 @@ class LinearAngles:
         middle = _angular_velocities(start + ends.mean(axis=1)[:, None] * change, change, self.order)
         # The axis of a rate turns with the angles before it.
         turned = (first * second + (first + second) * third) * (ends[:, 1] - ends[:, 0]) / 2
-        off = (self._rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)) * 4 * (first + second + third)
+        off = (self.rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)) * 4 * (first + second + third)
         # The slack bounds the norm of a vector, so it is valid in any frame.
         vary = varying(self.angles, self.order, UNTURNED)
         if self.frame is not None:
             middle, vary = self.frame.vectors(middle), turning_in_world(vary, self.frame)
         slack = (turned + off)[:, None] * vary
         return middle - slack, middle + slack
+
+
+def chord_hull(
+    turns: TurnsAtRates, segments: NDArray[np.intp], ends: FloatArray, off: FloatArray, vary: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return ranges (B, 3) of Cayley vectors over pieces, from chords between quaternions.
+
+    Args:
+        turns: the rotations.
+        segments: (B,) indices of the segments.
+        ends: (B, 2) ends of the parameter.
+        off: (B,) error bounds of quaternions.
+        vary: (3,) 0 for coordinates that are zero at all points; otherwise 1.
+    """
+    widths = turns.widths[segments]
+    rows, parts = divided(ends, np.ceil(widths * (ends[:, 1] - ends[:, 0]) / CHORD))
+    both = np.stack([turns.quaternions(segments[rows], s) for s in parts.T])
+    # A quaternion's derivative is at most half the sum of the angles' rates, its second derivative that squared.
+    bend, off = (0.5 * widths[rows] * (parts[:, 1] - parts[:, 0])) ** 2 / 8 * _UP, off[rows]
+    least = np.abs(both[:, :, 0]).min(axis=0) - bend - off
+    with np.errstate(divide="ignore"):
+        slack = _vector_slack(off, least) + bend * (1 / least**2 + 2 / least**3) * _UP
+    low, high = _hull(both, least, slack, vary)
+    first = np.flatnonzero(np.diff(rows, prepend=-1))
+    return np.minimum.reduceat(low, first), np.maximum.reduceat(high, first)
+
+
+def turned_between(first: FloatArray, last: FloatArray, s: FloatArray) -> FloatArray:
+    """Return the quaternions (n, 4) at fractions (n,) of the shortest rotations between quaternions (n, 4)."""
+    axes, angles = shortest_turns(first, last)
+    return turned(first, axes, s * angles)
 
 
 def relative(quaternions: FloatArray, reference: Reference) -> FloatArray:

@@ -9,6 +9,8 @@ Rotations have coordinates in which ``s R``, with a positive ``s``, is a polynom
 
 Positions may lie in a set inside the box (:mod:`.position_bounds`).
 
+Along a path, dimensions that change are further coordinates, after the pose.
+
 Ends are rounded outwards, so that the box contains every pose of the workspace.
 """
 
@@ -75,6 +77,8 @@ class PoseBox:
         dependent: indices of the dependent coordinates. Their bounds only start a search, and exclude no pose. A ball
             contains only independent components.
         positions: set of positions; None for all positions of the box.
+        settings: names of the dimensions that change along a path: components of the robot's parameters. They are the
+            last coordinates.
     """
 
     kind: TurnKind
@@ -85,6 +89,12 @@ class PoseBox:
     reference: Reference = UNTURNED
     dependent: tuple[int, ...] = ()
     positions: PositionBounds | None = None
+    settings: tuple[str, ...] = ()
+
+    @property
+    def of_pose(self) -> int:
+        """Number of coordinates of the pose: six, or seven with quaternions."""
+        return len(self.lower) - len(self.settings)
 
     @property
     def middle(self) -> FloatArray:
@@ -151,8 +161,8 @@ class PoseBox:
 
     def rotations(self, points: FloatArray) -> FloatArray:
         """Return the rotation matrices (K, 3, 3) at points (K, c)."""
-        turn = SX.sym("turn", points.shape[1] - 3)
-        return values_at(ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))]), points[:, 3:])[0]
+        turn, own = SX.sym("turn", self.of_pose - 3), points[:, 3 : self.of_pose]
+        return values_at(ca.Function("rotation", [turn], [ca.densify(rotation_of(self, turn))]), own)[0]
 
     def pose(self, y: FloatArray) -> PoseNumbers:
         """Return the pose at a point (c,)."""
@@ -169,7 +179,7 @@ class PoseBox:
     def _turn(self, pose: PoseNumbers) -> FloatArray:
         """Return the coordinates (3,) or (4,) of a pose's rotation."""
         R = pose.rotation
-        if len(self.lower) > 6:
+        if self.of_pose > 6:
             return np.append(math.cos(pose.angle / 2), math.sin(pose.angle / 2) * pose.axis)
         if self.kind is not TurnKind.ROLL_PITCH_YAW:
             axis, angle = pose.axis, pose.angle
@@ -220,7 +230,7 @@ class PoseBox:
 
     def random(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Return random points (count, 6) of the workspace."""
-        points = rng.uniform(self.lower, self.upper, (count, 6))
+        points = rng.uniform(self.lower, self.upper, (count, len(self.lower)))
         while math.isfinite(self.ball):
             outside = np.flatnonzero((points[:, self._turns] ** 2).sum(axis=1) > self._inner[2])
             if not outside.size:
@@ -261,8 +271,8 @@ def pose_box(workspace: Workspace) -> PoseBox:
 def pose_coordinates(box: PoseBox) -> PoseCoordinates:
     """Return the coordinates of a box of poses, for a case as expressions of these coordinates."""
     middle = 0.5 * box.lower + 0.5 * box.upper
-    values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3:])))]
-    for k in box.free:
+    values: list[Value] = [float(each) for each in (*middle[:3], *(2 * np.arctan(middle[3 : box.of_pose])))]
+    for k in (k for k in box.free if k < box.of_pose):
         values[k] = Free(float(box.lower[k]), float(box.upper[k]))
     return PoseCoordinates(values, lambda turn: rotation_of(box, turn), box.ball)
 

@@ -36,7 +36,7 @@ from .....models import Actuator, FloatArray, Member, Model, Substitution, Wrenc
 from .....models.instance import homogenised
 from .....models.member import scaled_twists
 from ....case.case import Case
-from ....case.pose import Free
+from ....case.pose import ends_of
 from ....evidence.closed_loops import Loops
 from ....evidence.dependent import loop_system
 from .pose_box import PoseBox, polynomial_rotation, rotation_of
@@ -275,7 +275,7 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     """Return a model as expressions of the coordinates.
 
     Args:
-        case: case with fixed dimensions.
+        case: case whose dimensions are fixed, or change along the path.
         model: robot of the case; joint-centre errors may follow its parameters.
         box: box of poses.
         z: (n, 1) symbols of the coordinates; new ones if left out.
@@ -285,9 +285,18 @@ def posed_model(case: Case, model: Model, box: PoseBox, z: SX | None = None, err
     if z is None:
         z = ca.vertcat(SX(0, 1), *[SX.sym(f"y{k}") for k in free], *[SX.sym(item.name) for item in model.unknowns])
     y = box.symbols(z)
-    position, turn = y[:3], y[3:]
-    values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
-    numbers = ca.vertcat(SX(0, 1), *values, errors)
+    position, turn = y[:3], y[3 : box.of_pose]
+    changing = {name: box.of_pose + k for k, name in enumerate(box.settings)}
+    stated = [
+        (name, v)
+        for item in case.model.parameters
+        for name, v in zip(item.components, case.components(item.name), strict=True)
+    ]
+    # Dimensions that change along the path are coordinates, in the order of the robot's parameters.
+    numbers = ca.vertcat(
+        SX(0, 1), *[y[changing[name]] if name in changing else SX(sum(ends_of(v)) / 2) for name, v in stated], errors
+    )
+    values = [sum(ends_of(v)) / 2 for _, v in stated]
     own = Substitution.identity(model)
     given = replace(own, parameters=numbers, unknowns=z[len(free) :], position=position)
     outputs = [

@@ -145,11 +145,16 @@ class Problem:
     @property
     def rated(self) -> list[int]:
         """Indices, in :meth:`.path_cover.PathCover.rates`, of the rates that vary along a path."""
-        stated = [self.free[j] for j in self.stated]
-        turns = [k for k in stated if k >= 3]
+        stated, of_pose = [self.free[j] for j in self.stated], self.box.of_pose
+        turns, settings = [k for k in stated if 3 <= k < of_pose], [6 + k - of_pose for k in stated if k >= of_pose]
         if turns and self.box.kind is not TurnKind.ROLL_PITCH_YAW:
             turns = [3, 4, 5]
-        return [k for k in stated if k < 3] + turns
+        return [k for k in stated if k < 3] + turns + settings
+
+    @property
+    def of_settings(self) -> list[int]:
+        """Indices of the coordinates that are dimensions which change along a path."""
+        return [j for j, k in enumerate(self.free) if k >= self.box.of_pose]
 
     @property
     def of_path(self) -> list[int]:
