@@ -81,19 +81,23 @@ def view_without_solver(case: Case, fault: str) -> ViewSource:
 
 def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
     """Return the C of the module's exports."""
-    places = subject.nlp.program.places
-    joints = sorted(places.inner) if functions.closure else []
-    # Without as many equations as joint coordinates, there are no derivatives of F with closed loops.
-    closed = list(functions.closure) if len(functions.closure) == len(joints) else []
+    places, epigraph = subject.nlp.program.places, subject.nlp.program.places.epigraph
+    joints = [*sorted(places.inner), *([] if epigraph is None else [epigraph.level])]
+    tables = {
+        "closure": functions.closure,
+        "levels": functions.levels,
+        "joints": joints,
+        "followers": functions.followers,
+        "groups": _groups(subject.nlp),
+    }
     names = {
         "id": prefix,
         "ID": prefix.upper(),
         "ninputs": functions.view.numel_in(0),
         "nview": functions.view.numel_out(0),
         "rows_at": functions.blocks["rows"][0],
-        "nclosure": len(closed),
-        "closure_rows": ", ".join(map(str, [*closed, 0])),
-        "closure_joints": ", ".join(map(str, [*(joints if closed else []), 0])),
+        **{f"n{name}": len(table) for name, table in tables.items()},
+        **{name: ", ".join(map(str, [*table, 0])) for name, table in tables.items()},
         "nreadings": len(functions.readings.known),
         "has_slopes": int(functions.slopes is not None),
         "view_work": max(each.sz_w() for each in functions.all),
@@ -101,3 +105,9 @@ def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
         "view_sz_res": max(each.sz_res() for each in functions.all),
     }
     return Template((FOLDER / "view.c.in").read_text(encoding="utf-8")).substitute(names)
+
+
+def _groups(nlp: Nlp) -> list[int]:
+    """Return the number of rows of each wrench and of each limb member, in the order of the rows."""
+    model = nlp.case.model
+    return [*(1 for _ in model.wrenches), *(each.size for each in model.members)]

@@ -110,7 +110,7 @@ def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: i
         size = quantity.size
         close(block(found, given.source, "quantities")[start : start + size], quantity)
         start += size
-    if not functions.closure and functions.slopes is not None:
+    if not functions.closure and not functions.levels and functions.slopes is not None:
         close(found["gradient"], values.gradient)
         natural = nlp.objective_size / max(1.0, float(np.abs(p).max()))
         close(found["slopes"], kernels.argument_derivatives(x, p).gradient, least=natural)
@@ -124,8 +124,7 @@ def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: i
     )
     close(block(found, given.source, "points"), posture.points)
     assert found["rank"] == here.rank
-    if not nlp.case.model.members:
-        close(found["singular_values"][: len(here.singular_values)], here.singular_values)
+    close(found["singular_values"][: len(here.singular_values)], here.singular_values)
     if "largest" in functions.blocks and not here.is_singular:
         loads = loads_at(nlp, x, here, pose)
         error = 1e-12 / (here.singular_values[-1] / here.singular_values[0]) ** 2
