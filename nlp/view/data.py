@@ -16,6 +16,7 @@ from ...models import Dimension, FloatArray, Parameter
 from ...models.instance import length_of
 from ...models.statics import driven_joints
 from ..case.case import Case
+from ..case.excursions import in_world
 from ..case.forces import dimension_of_force, dimension_of_speed
 from ..case.pose import ends_of
 from ..case.workspace import POSITION, TurnKind
@@ -331,21 +332,12 @@ def _travel(nlp: Nlp) -> TravelData | None:
     workspace = case.workspace
     if workspace is None or len(nlp.program.robots) > 1:
         return None
-    names = [each["set"] or each["name"] for each in _sliders(nlp)]
-    prefix = case.pose_prefixes[0]
-    centre = [0.0] * 3
-    if workspace.about_pose:
-        placed = zip((f"{prefix}p_{letter}" for letter in POSITION), case.poses[0].position, strict=True)
-        # Excursions are along the axes of the world only without a stated rotation.
-        values = [number for _, number in placed]
-        if not all(isinstance(each, float | int) for each in values):
-            return None
-        centre = [float(each) for each in values if isinstance(each, float | int)]
+    workspace = in_world(workspace, case.poses[0])
+    names, prefix = [each["set"] for each in _sliders(nlp)], case.pose_prefixes[0]
     found: list[tuple[int, float, float]] = []
-    for letter, value, middle in zip(POSITION, workspace.position, centre, strict=True):
-        low, high = ends_of(value)
+    for letter, value in zip(POSITION, workspace.position, strict=True):
         if (name := f"{prefix}p_{letter}") in names:
-            found.append((names.index(name), low + middle, high + middle))
+            found.append((names.index(name), *ends_of(value)))
     turns, rotation = workspace.turns, nlp.program.places.rotations[0]
     low, high = ends_of(turns.angles[0])
     turn, notice = 0.0, ""
