@@ -152,7 +152,7 @@ class ViewData(TypedDict):
     sliders: list[SliderData]
     rotations: list[RotationData]
     inner: list[int]
-    kept: list[int]
+    is_following: bool
     notice: str
     limits: list[LimitData]
     rows: list[RowData]
@@ -168,6 +168,8 @@ class ViewData(TypedDict):
     row_limbs: list[str]
     seeds: int
     has_slopes: bool
+    level: int
+    turn_axes: list[list[float]]
     cones: list[ConeData]
     travel: TravelData | None
     checksum: str
@@ -186,7 +188,7 @@ def view_data(source: ViewSource) -> ViewData:
         "sliders": [*_sliders(nlp)],
         "rotations": _rotations(nlp),
         "inner": _following(nlp),
-        "kept": [*functions.closure, *functions.levels],
+        "is_following": bool(functions.followers),
         "notice": case.stated_pose_notice if case.limits_over else "",
         "limits": _limits(nlp),
         "rows": _rows(nlp, functions, units),
@@ -219,6 +221,10 @@ def view_data(source: ViewSource) -> ViewData:
         "row_limbs": [row.limb for row in case.model.frame_rows],
         "seeds": 16,
         "has_slopes": functions.slopes is not None,
+        "level": -1 if program.places.epigraph is None else program.places.epigraph.level,
+        "turn_axes": [
+            np.ravel(pose.rotation.axis).tolist() if pose.rotation.axis is not None else [] for pose in case.poses
+        ],
         "cones": [
             {"count": len(case.model.legs), "key": f"{each.key}.max", "angle": each.max} for each in functions.cones
         ],

@@ -9,12 +9,15 @@ from pathlib import Path
 from string import Template
 
 from ..case.case import Case
+from ..case.task import Method
 from ..embedding.codegen import c_of_subject
 from ..embedding.ctext import identifier
 from ..embedding.manifest import solver_files
 from ..embedding.subject import Subject, find_subject
 from ..embedding.templates import casadi_texts
+from ..errors import CaseError
 from ..program.formulation import formulate_each
+from ..program.nlp import Nlp
 from .functions import ViewFunctions, view_functions
 
 #: Folder of the template and of the headers in place of those of a C library.
@@ -68,15 +71,37 @@ def view_source(case: Case) -> ViewSource:
     return ViewSource(subject, functions, files)
 
 
-def view_without_solver(case: Case, fault: str) -> ViewSource:
+def view_without_solver(case: Case, error: CaseError) -> ViewSource:
     """Return the live view of a case for which C cannot be generated: its drawing, without a module.
 
     Args:
         case: the case.
-        fault: reason why C cannot be generated.
+        error: reason why C cannot be generated.
     """
     subject = Subject(formulate_each(case)[0], None)
-    return ViewSource(subject, view_functions(subject.nlp, f"{identifier(case.name)}_VIEW"), {}, fault)
+    functions = view_functions(subject.nlp, f"{identifier(case.name)}_VIEW")
+    return ViewSource(subject, functions, {}, _reason(case, error))
+
+
+def _reason(case: Case, error: CaseError) -> str:
+    """Return the reason why C cannot be generated as a plain sentence, without keys of case files."""
+    match error.key:
+        case "objective.minimise":
+            return f"the solver in the page optimises F only, and this case minimises the {_spaced(str(error.value))}"
+        case "combine.method" if case.method is Method.AVERAGE:
+            return "the solver in the page does not combine tasks by the average of their optima"
+        case "combine.method":
+            return "the tasks cannot be combined, because for one of them no optimum was found"
+        case "robot":
+            return "the solver in the page does not support robots with loops within a limb"
+        case "pose":
+            return "the limits between all pairs of the poses are too many for the solver in the page"
+        case _:
+            return str(error)
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
