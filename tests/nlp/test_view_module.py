@@ -147,6 +147,21 @@ def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
         check_values(each, given, x[k], p[k], int(poses[k]))
 
 
+def test_legs_are_inside_cones_by_the_angles_of_the_limits(tmp_path: Path) -> None:
+    given = made("hexapod-machining")
+    nlp, x = given.nlp, starting_point(given.nlp)
+    point = {"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": 0}
+    found = run(tmp_path, given, [point])["points"][0]
+    base, platform = np.array(block(found, given.source, "cones"), dtype=float).reshape(2, 6, 6)
+    span = platform[:, :3] - base[:, :3]
+    span /= np.linalg.norm(span, axis=1, keepdims=True)
+    angles = np.arccos([*(span * base[:, 3:]).sum(axis=1), *(-span * platform[:, 3:]).sum(axis=1)])
+    readings = given.source.functions.readings
+    names = [readings.rows[k].constraint.name for k in readings.known]
+    stated = [value for name, value in zip(names, found["readings"], strict=True) if "_joint_angle" in name]
+    close(stated, angles, 1e-7)
+
+
 @pytest.mark.parametrize("name", soaked(LIVE, FEW))
 def test_optimum_is_that_of_solve(name: str, tmp_path: Path) -> None:
     given = made(name)

@@ -4,7 +4,7 @@ import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
 import { axesOf, colourOf, conesOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
-import { Sliders, byId, showValues } from "./panel.js";
+import { Sliders, byId, make, showValues } from "./panel.js";
 import { TaskSliders } from "./tasks.js";
 import { LimitBars, showActuators } from "./bars.js";
 import { addJumps } from "./jumps.js";
@@ -184,6 +184,10 @@ const listen = () => {
 };
 
 byId("colour").addEventListener("change", draw);
+// Both buttons stay on one line.
+const buttons = make("span", { class: "together" });
+byId("view-reset").before(buttons);
+buttons.append(byId("view-reset"), byId("view-fit"));
 byId("view-reset").addEventListener("click", () => picture.reset());
 byId("view-fit").addEventListener("click", () => {
   picture.fitted = [];
