@@ -149,7 +149,8 @@ def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
 
 def test_legs_are_inside_cones_by_the_angles_of_the_limits(tmp_path: Path) -> None:
     given = made("hexapod-machining")
-    nlp, x = given.nlp, starting_point(given.nlp)
+    nlp = given.nlp
+    x = nlp.lower + (nlp.upper - nlp.lower) * np.random.default_rng(2).random(nlp.n)
     point = {"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": 0}
     found = run(tmp_path, given, [point])["points"][0]
     base, platform = np.array(block(found, given.source, "cones"), dtype=float).reshape(2, 6, 6)

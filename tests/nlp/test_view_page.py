@@ -422,7 +422,7 @@ def test_the_worst_pose_of_a_workspace_is_sampled_and_says_so(live: Callable[...
 @needs_compiler
 @pytest.mark.browser
 def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_path: Path) -> None:
-    page = live("paper-4.2")
+    page = live("peg-in-hole")
     page.click("mode-evaluate")
     page.chrome.execute_script("document.getElementById('tasks-group').open = true")
     ranges = [
