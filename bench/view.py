@@ -166,9 +166,7 @@ def main() -> int:
         sys.stdout.flush()
     if options.json:
         Path(options.json).write_text(json.dumps(rows, indent=2) + "\n", encoding="utf-8")
-    missed = [
-        row["name"] for row in rows if row.get("error", 0.0) > AIM or row.get("optimum_error", 0.0) > AIM_OPTIMUM
-    ]
+    missed = [row["name"] for row in rows if row.get("error", 0.0) > AIM or row.get("optimum_error", 0.0) > AIM_OPTIMUM]
     sys.stdout.write(f"aims missed: {', '.join(missed) or 'none'}\n")
     return int(bool(missed))
 

@@ -265,9 +265,7 @@ def _longest_moment(model: Model, rows: FloatArray, centre: FloatArray) -> float
     return longest or 1.0
 
 
-def _rank_and_free_twists(
-    jacobian: FloatArray, centre: FloatArray, arm: float
-) -> tuple[int, FloatArray, FloatArray]:
+def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray, arm: float) -> tuple[int, FloatArray, FloatArray]:
     """Return the rank, the free twists (6 - rank, 6) and the singular values of J.
 
     Args:

@@ -35,8 +35,8 @@ class ViewFunctions:
         view: function of the robot's inputs at a pose; its only result is all blocks one below the other.
         blocks: first index and size of each block of the result, by name.
         inputs: function ``(x, p)`` to the robot's inputs at all poses.
-        slopes: function ``(x, p, multipliers)`` to the derivatives by ``p`` of the objective minus the multipliers times
-            the constraints of ``closure`` and ``levels``; None if it has too many operations.
+        slopes: function ``(x, p, multipliers)`` to the derivatives by ``p`` of the objective minus the multipliers
+            times the constraints of ``closure`` and ``levels``; None if it has too many operations.
         closure: indices of the constraints that loops impose on joint coordinates and poses.
         levels: indices of the constraints that determine the level of a worst case; empty without a level.
         followers: indices in ``x`` of the coordinates of poses that follow when a closed loop moves another variable;

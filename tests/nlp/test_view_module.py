@@ -205,7 +205,9 @@ def worst(nlp: Nlp, x: Array, p: Array) -> float:
 FOLLOWED = ["new delta", "new 3-rps", "new five-bar", "haptic-device"]
 
 
-@pytest.mark.parametrize("name", soaked([*dict.fromkeys([*(f"new {each}" for each in EACH_KIND), *FOLLOWED])], FOLLOWED))
+@pytest.mark.parametrize(
+    "name", soaked([*dict.fromkeys([*(f"new {each}" for each in EACH_KIND), *FOLLOWED])], FOLLOWED)
+)
 def test_derivatives_follow_closed_loops_and_levels(name: str, tmp_path: Path) -> None:
     """Central differences with the loops closed again, and the level found again, at each point."""
     given = made(name)

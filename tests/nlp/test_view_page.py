@@ -437,7 +437,7 @@ def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_
         "requestAnimationFrame(() => requestAnimationFrame(done));",
         ranges[0],
     )
-    assert page.F != before
+    assert before != page.F
     command = shlex.split(page.copied("copy-set"))
     assert any(each.startswith("task[0].weight=") for each in command)
     target = tmp_path / "evaluated.json"
