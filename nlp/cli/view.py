@@ -42,7 +42,7 @@ def view(
     try:
         source = view_source(loaded)
     except CaseError as error:
-        source = view_without_solver(loaded, str(error))
+        source = view_without_solver(loaded, error)
     solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
     page = live_page(source, solution, case)
     write_text(target, page.text)

@@ -12,6 +12,7 @@ from ...models import (
     Dimension,
     Displacement,
     FloatArray,
+    Model,
     axis_angle_from_matrix,
     frozen_array,
     homogenised,
@@ -32,7 +33,7 @@ from .paths import numbers_at
 
 #: Relative value, compared with F without cancellation, below which F is zero: the rates are then below 1e-6.
 ZERO_F = 1e-12
-#: Singular values below this fraction of the largest, with moments divided by their longest arm, are zero: this is the
+#: Singular values below this fraction of the largest, with moments divided by the longest one, are zero: this is the
 #: square root of the rounding unit of double precision: points are known to rounding error only.
 ZERO_SINGULAR_VALUE = 1.5e-8
 #: Largest residual of a closed loop's equation, of magnitude about 1: in another assembly mode it is about 0.1.
@@ -54,7 +55,8 @@ class RobotState:
         F: ``sum(rates^2)``.
         size: sum of the magnitudes of the terms of F; an F that is small compared with ``size`` counts as zero.
         singular_values: (min(m, 6),) singular values of the Jacobian with moments about the platform's origin, divided
-            by their longest arm, largest first: plain numbers, the same in every unit of length.
+            by the longest moment of any unit wrench of a limb, largest first: plain numbers, the same in every unit of
+            length.
         rank: number of non-zero singular values.
         free_twists: (6 - rank, 6) basis of the twists that no row of the Jacobian resists, in reduced echelon form. The
             largest component of each angular velocity, or of the velocity of a translation, is 1 or -1.
@@ -148,7 +150,9 @@ def evaluate(nlp: Nlp, x: FloatArray, pose: int = 0) -> RobotState:
     stated, step = _pose_displacements(case)[pose]
     if step.is_identity:
         axis, angle = _stated_axis_angle(nlp, x, stated, rotation)
-    rank, free_twists, singular_values = _rank_and_free_twists(jacobian, position.ravel())
+    rank, free_twists, singular_values = _rank_and_free_twists(
+        jacobian, position.ravel(), _longest_moment(model, numbers.jacobian, position.ravel())
+    )
     return RobotState(
         parameters=MappingProxyType(
             {item.name: frozen_array(part, part.shape) for item, part in zip(model.parameters, parts, strict=True)}
@@ -241,16 +245,34 @@ def _pose_displacements(case: Case) -> list[tuple[int, Displacement]]:
     return [(station.pose, station.step) for station in case.stations]
 
 
-def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray) -> tuple[int, FloatArray, FloatArray]:
-    """Return the rank, the free twists (6 - rank, 6) and the singular values of J.
+def _longest_moment(model: Model, rows: FloatArray, centre: FloatArray) -> float:
+    """Return the longest moment of any unit wrench of a limb, length; 1 without moments.
 
-    Moments are taken about the platform's origin and divided by their longest arm.
+    A limb member resists with a whole space of wrenches, so its longest moment is that of any unit combination of its
+    rows: it does not depend on their basis.
+
+    Args:
+        model: the robot.
+        rows: (m, 6) rows of a :class:`~screwsynth.models.instance.RobotInstance`, moments about the world origin.
+        centre: (3,) the platform's origin in the world frame, length.
+    """
+    moments = np.array(homogenised(rows, centre, 1.0))[3:].T
+    at = len(model.wrenches)
+    longest = float(np.linalg.norm(moments[:at], axis=1).max(initial=0.0))
+    for member in model.members:
+        longest = max(longest, float(np.linalg.norm(moments[at : at + member.size], ord=2)))
+        at += member.size
+    return longest or 1.0
+
+
+def _rank_and_free_twists(jacobian: FloatArray, centre: FloatArray, arm: float) -> tuple[int, FloatArray, FloatArray]:
+    """Return the rank, the free twists (6 - rank, 6) and the singular values of J.
 
     Args:
         jacobian: (m, 6) rows force, then moment about the world origin.
-        centre: (3,) the platform's origin in the world frame, length.
+        centre: (3,) the platform's origin in the world frame, length: moments are taken about it.
+        arm: length by which moments are divided.
     """
-    arm = float(np.max(np.linalg.norm(homogenised(jacobian, centre, 1.0)[3:], axis=0))) or 1.0
     # Columns in the order of a twist (omega, v), so that a null vector is a twist: omega in units of v / arm.
     forces, moments = np.split(np.array(homogenised(jacobian, centre, arm)), 2)
     resistance = np.vstack([moments, forces]).T

@@ -113,7 +113,7 @@ class PoseStateData(JsonObject):
         rank: rank of the Jacobian.
         singular: If true, the rank is below six.
         singular_values: singular values of the Jacobian, largest first, with moments about the platform's origin,
-            divided by their longest arm.
+            divided by the longest moment of any unit wrench of a limb.
         quantities: quantities such as leg lengths and joint angles, by name and limb.
         limited_quantities: further quantities that the case limits, by name and limb: joint angles from stated mounting
             axes, and leg lengths of a robot defined by joints; absent without any.
@@ -158,7 +158,7 @@ class RobotData(JsonObject):
         rank: rank of the Jacobian.
         singular: If true, the rank is below six.
         singular_values: singular values of the Jacobian, largest first, with moments about the platform's origin,
-            divided by their longest arm.
+            divided by the longest moment of any unit wrench of a limb.
         free_motions: basis of the motions that no row resists.
         task_is_free: If true, F is zero: nothing resists the task's motion.
         quantities: quantities such as leg lengths and joint angles, by name and limb.

@@ -7,7 +7,7 @@ case's units.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TypedDict
 
 import numpy as np
@@ -16,7 +16,10 @@ from ...models import Dimension, FloatArray, Parameter
 from ...models.instance import length_of
 from ...models.statics import driven_joints
 from ..case.case import Case
+from ..case.excursions import in_world
 from ..case.forces import dimension_of_force, dimension_of_speed
+from ..case.pose import ends_of
+from ..case.workspace import POSITION, TurnKind
 from ..embedding.runtimelimits import run_time_limits
 from ..program.nlp import Nlp
 from ..program.places import FreeRotation, Place
@@ -57,6 +60,28 @@ class SliderData(TypedDict):
     start: float
     turn: bool
     pose: int
+
+
+class ConeData(TypedDict):
+    """Cones of the passive joints of a plate: number of joints, key of the half angle among the limits, and its value.
+
+    The value is in radians, as the half angle of the case.
+    """
+
+    count: int
+    key: str
+    angle: float
+
+
+class TravelData(TypedDict):
+    """Poses of a workspace: index of the slider and ends of each coordinate, in the units of computations.
+
+    For a rotation by a free axis, ``turn`` is its largest angle, 0 without one. ``notice`` names what is left out.
+    """
+
+    coordinates: list[tuple[int, float, float]]
+    turn: float
+    notice: str
 
 
 class RotationData(TypedDict):
@@ -127,7 +152,7 @@ class ViewData(TypedDict):
     sliders: list[SliderData]
     rotations: list[RotationData]
     inner: list[int]
-    kept: list[int]
+    is_following: bool
     notice: str
     limits: list[LimitData]
     rows: list[RowData]
@@ -143,7 +168,10 @@ class ViewData(TypedDict):
     row_limbs: list[str]
     seeds: int
     has_slopes: bool
-    has_members: bool
+    level: int
+    turn_axes: list[list[float]]
+    cones: list[ConeData]
+    travel: TravelData | None
     checksum: str
 
 
@@ -160,7 +188,7 @@ def view_data(source: ViewSource) -> ViewData:
         "sliders": [*_sliders(nlp)],
         "rotations": _rotations(nlp),
         "inner": _following(nlp),
-        "kept": [*functions.closure, *_level_rows(nlp)],
+        "is_following": bool(functions.followers),
         "notice": case.stated_pose_notice if case.limits_over else "",
         "limits": _limits(nlp),
         "rows": _rows(nlp, functions, units),
@@ -193,8 +221,14 @@ def view_data(source: ViewSource) -> ViewData:
         "row_limbs": [row.limb for row in case.model.frame_rows],
         "seeds": 16,
         "has_slopes": functions.slopes is not None,
-        # The rows of a member are not those of results, so singular values of both differ by a unit of length.
-        "has_members": bool(case.model.members),
+        "level": -1 if program.places.epigraph is None else program.places.epigraph.level,
+        "turn_axes": [
+            np.ravel(pose.rotation.axis).tolist() if pose.rotation.axis is not None else [] for pose in case.poses
+        ],
+        "cones": [
+            {"count": len(case.model.legs), "key": f"{each.key}.max", "angle": each.max} for each in functions.cones
+        ],
+        "travel": _travel(nlp),
         "checksum": source.checksum,
     }
 
@@ -292,17 +326,42 @@ def _following(nlp: Nlp) -> list[int]:
     return sorted([*nlp.program.places.inner, *([] if epigraph is None else [epigraph.level])])
 
 
-def _level_rows(nlp: Nlp) -> list[int]:
-    """Return the indices of the constraints that determine the level of a worst case."""
-    epigraph, constraints = nlp.program.places.epigraph, nlp.program.constraints
-    rows = () if epigraph is None else {id(each) for each in epigraph.constraints}
-    return [k for k, each in enumerate(constraints) if id(each) in rows]
-
-
 def _rotations(nlp: Nlp) -> list[RotationData]:
     """Return the rotations with a free axis."""
     named = zip(nlp.program.places.rotations, nlp.case.pose_prefixes, strict=True)
     return [{"prefix": prefix, "q": list(each.q)} for each, prefix in named if isinstance(each, FreeRotation)]
+
+
+def _travel(nlp: Nlp) -> TravelData | None:
+    """Return the poses of the workspace of a case with one pose; None without a workspace or several poses."""
+    case = nlp.case
+    workspace = case.workspace
+    if workspace is None or len(nlp.program.robots) > 1:
+        return None
+    workspace = in_world(workspace, case.poses[0])
+    names, prefix = [each["set"] for each in _sliders(nlp)], case.pose_prefixes[0]
+    found: list[tuple[int, float, float]] = []
+    for letter, value in zip(POSITION, workspace.position, strict=True):
+        if (name := f"{prefix}p_{letter}") in names:
+            found.append((names.index(name), *ends_of(value)))
+    turns, rotation = workspace.turns, nlp.program.places.rotations[0]
+    low, high = ends_of(turns.angles[0])
+    turn, notice = 0.0, ""
+    if isinstance(rotation, FreeRotation) and turns.kind is TurnKind.ANY_AXIS:
+        turn = high
+    elif turns.kind is TurnKind.AXIS and f"{prefix}angle" in names and _has_axis(case, turns.axis):
+        found.append((names.index(f"{prefix}angle"), low, high))
+    elif any(ends_of(each) != (0.0, 0.0) for each in turns.angles):
+        notice = "without the rotations of the workspace"
+    if workspace.position_set is not None:
+        notice = ", ".join(["over the box about its set of positions", *([notice] if notice else [])])
+    return {"coordinates": found, "turn": turn, "notice": notice}
+
+
+def _has_axis(case: Case, axis: Sequence[float]) -> bool:
+    """Return whether the stated pose of a case turns about an axis."""
+    own = case.poses[0].rotation.axis
+    return own is not None and bool(np.allclose(np.ravel(own), axis, rtol=0, atol=1e-12))
 
 
 def _limits(nlp: Nlp) -> list[LimitData]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from string import Template
 
 from ..case.case import Case
+from ..case.task import Method
 from ..embedding.codegen import c_of_subject
 from ..embedding.ctext import identifier
 from ..embedding.manifest import solver_files
@@ -16,6 +17,7 @@ from ..embedding.subject import Subject, find_subject
 from ..embedding.templates import casadi_texts
 from ..errors import CaseError
 from ..program.formulation import formulate_each
+from ..program.nlp import Nlp
 from .functions import ViewFunctions, view_functions
 
 #: Folder of the template and of the headers in place of those of a C library.
@@ -81,33 +83,59 @@ def _refuse_changes(case: Case) -> None:
         raise CaseError(case.changing_key, fault, source=case.source)
 
 
-def view_without_solver(case: Case, fault: str) -> ViewSource:
+def view_without_solver(case: Case, error: CaseError) -> ViewSource:
     """Return the live view of a case for which C cannot be generated: its drawing, without a module.
 
     Args:
         case: the case.
-        fault: reason why C cannot be generated.
+        error: reason why C cannot be generated.
     """
     _refuse_changes(case)
     subject = Subject(formulate_each(case)[0], None)
-    return ViewSource(subject, view_functions(subject.nlp, f"{identifier(case.name)}_VIEW"), {}, fault)
+    functions = view_functions(subject.nlp, f"{identifier(case.name)}_VIEW")
+    return ViewSource(subject, functions, {}, _reason(case, error))
+
+
+def _reason(case: Case, error: CaseError) -> str:
+    """Return the reason why C cannot be generated as a plain sentence, without keys of case files."""
+    match error.key:
+        case "objective.minimise":
+            return f"the solver in the page optimises F only, and this case minimises the {_spaced(str(error.value))}"
+        case "combine.method" if case.method is Method.AVERAGE:
+            return "the solver in the page does not combine tasks by the average of their optima"
+        case "combine.method":
+            return "the tasks cannot be combined, because for one of them no optimum was found"
+        case "robot":
+            return "the solver in the page does not support robots with loops within a limb"
+        case "pose":
+            return "the limits between all pairs of the poses are too many for the solver in the page"
+        case _:
+            return str(error)
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
     """Return the C of the module's exports."""
-    places = subject.nlp.program.places
-    joints = sorted(places.inner) if functions.closure else []
-    # Without as many equations as joint coordinates, there are no derivatives of F with closed loops.
-    closed = list(functions.closure) if len(functions.closure) == len(joints) else []
+    places, epigraph = subject.nlp.program.places, subject.nlp.program.places.epigraph
+    joints = [*sorted(places.inner), *([] if epigraph is None else [epigraph.level])]
+    tables = {
+        "closure": functions.closure,
+        "levels": functions.levels,
+        "joints": joints,
+        "followers": functions.followers,
+        "groups": _groups(subject.nlp),
+    }
     names = {
         "id": prefix,
         "ID": prefix.upper(),
         "ninputs": functions.view.numel_in(0),
         "nview": functions.view.numel_out(0),
         "rows_at": functions.blocks["rows"][0],
-        "nclosure": len(closed),
-        "closure_rows": ", ".join(map(str, [*closed, 0])),
-        "closure_joints": ", ".join(map(str, [*(joints if closed else []), 0])),
+        **{f"n{name}": len(table) for name, table in tables.items()},
+        **{name: ", ".join(map(str, [*table, 0])) for name, table in tables.items()},
         "nreadings": len(functions.readings.known),
         "has_slopes": int(functions.slopes is not None),
         "view_work": max(each.sz_w() for each in functions.all),
@@ -115,3 +143,9 @@ def _exports(subject: Subject, functions: ViewFunctions, prefix: str) -> str:
         "view_sz_res": max(each.sz_res() for each in functions.all),
     }
     return Template((FOLDER / "view.c.in").read_text(encoding="utf-8")).substitute(names)
+
+
+def _groups(nlp: Nlp) -> list[int]:
+    """Return the number of rows of each wrench and of each limb member, in the order of the rows."""
+    model = nlp.case.model
+    return [*(1 for _ in model.wrenches), *(each.size for each in model.members)]

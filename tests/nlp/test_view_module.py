@@ -18,7 +18,6 @@ from screwsynth.nlp import Case, Nlp, load_case, shipped_cases, solve
 from screwsynth.nlp.cli.viewed import read_viewed
 from screwsynth.nlp.errors import CaseError, EvaluationError, InputError
 from screwsynth.nlp.evidence.evaluation import starting_point
-from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.loads import loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output import live
@@ -110,7 +109,7 @@ def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: i
         size = quantity.size
         close(block(found, given.source, "quantities")[start : start + size], quantity)
         start += size
-    if not functions.closure and functions.slopes is not None:
+    if not functions.closure and not functions.levels and functions.slopes is not None:
         close(found["gradient"], values.gradient)
         natural = nlp.objective_size / max(1.0, float(np.abs(p).max()))
         close(found["slopes"], kernels.argument_derivatives(x, p).gradient, least=natural)
@@ -124,8 +123,7 @@ def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: i
     )
     close(block(found, given.source, "points"), posture.points)
     assert found["rank"] == here.rank
-    if not nlp.case.model.members:
-        close(found["singular_values"][: len(here.singular_values)], here.singular_values)
+    close(found["singular_values"][: len(here.singular_values)], here.singular_values)
     if "largest" in functions.blocks and not here.is_singular:
         loads = loads_at(nlp, x, here, pose)
         error = 1e-12 / (here.singular_values[-1] / here.singular_values[0]) ** 2
@@ -149,6 +147,22 @@ def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
         check_values(each, given, x[k], p[k], int(poses[k]))
 
 
+def test_legs_are_inside_cones_by_the_angles_of_the_limits(tmp_path: Path) -> None:
+    given = made("hexapod-machining")
+    nlp = given.nlp
+    x = nlp.lower + (nlp.upper - nlp.lower) * np.random.default_rng(2).random(nlp.n)
+    point = {"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": 0}
+    found = run(tmp_path, given, [point])["points"][0]
+    base, platform = np.array(block(found, given.source, "cones"), dtype=float).reshape(2, 6, 6)
+    span = platform[:, :3] - base[:, :3]
+    span /= np.linalg.norm(span, axis=1, keepdims=True)
+    angles = np.arccos([*(span * base[:, 3:]).sum(axis=1), *(-span * platform[:, 3:]).sum(axis=1)])
+    readings = given.source.functions.readings
+    names = [readings.rows[k].constraint.name for k in readings.known]
+    stated = [value for name, value in zip(names, found["readings"], strict=True) if "_joint_angle" in name]
+    close(stated, angles, 1e-7)
+
+
 @pytest.mark.parametrize("name", soaked(LIVE, FEW))
 def test_optimum_is_that_of_solve(name: str, tmp_path: Path) -> None:
     given = made(name)
@@ -163,26 +177,73 @@ def test_optimum_is_that_of_solve(name: str, tmp_path: Path) -> None:
     assert answer["F"] == pytest.approx(own.F, rel=1e-6, abs=1e-6 * given.nlp.objective_size)
 
 
-@pytest.mark.parametrize("name", soaked([f"new {each}" for each in EACH_KIND], ["new delta"]))
-def test_derivatives_follow_closed_loops(name: str, tmp_path: Path) -> None:
-    """Central differences with the loops closed again at each point."""
+def closed(nlp: Nlp, x: Array, p: Array, rows: list[int], free: list[int]) -> Array:
+    """The point with closed loops: the smallest change of the free variables, each relative to its range."""
+    values, x = nlp.program.kernels.derivatives, np.array(x)
+    ranges = (nlp.upper - nlp.lower)[free]
+    for _ in range(20):
+        found = values(x, p)
+        g, slopes = np.asarray(found.g).ravel()[rows], np.asarray(found.jacobian)[np.ix_(rows, free)]
+        if np.abs(g).max(initial=0.0) < 1e-14:
+            break
+        x[free] -= ranges * (np.linalg.pinv(slopes * ranges, rcond=1e-9) @ g)
+    return x
+
+
+def worst(nlp: Nlp, x: Array, p: Array) -> float:
+    """The objective; for a worst case, the best level that its constraints allow."""
+    epigraph = nlp.program.places.epigraph
+    if epigraph is None:
+        return np.asarray(nlp.program.kernels.derivatives(x, p).F).item()
+    # A constraint is its level at x and its slack, in units of the ceiling.
+    rows = nlp.program.kernels.derivatives(x, p)
+    own = [k for k, each in enumerate(nlp.program.constraints) if any(each is level for level in epigraph.constraints)]
+    slack = np.asarray(rows.g).ravel()[own]
+    return float(x[epigraph.level] - slack.min() / np.asarray(rows.jacobian)[own[int(slack.argmin())], epigraph.level])
+
+
+FOLLOWED = ["new delta", "new 3-rps", "new five-bar", "haptic-device"]
+
+
+@pytest.mark.parametrize(
+    "name", soaked([*dict.fromkeys([*(f"new {each}" for each in EACH_KIND), *FOLLOWED])], FOLLOWED)
+)
+def test_derivatives_follow_closed_loops_and_levels(name: str, tmp_path: Path) -> None:
+    """Central differences with the loops closed again, and the level found again, at each point."""
     given = made(name)
-    nlp = given.nlp
-    if not given.source.functions.closure or given.source.functions.slopes is None:
-        pytest.skip("no closed loops")
-    x = starting_point(nlp)
-    found = run(tmp_path, given, [{"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": 0}])["points"][0]
-    inner = set(nlp.program.places.inner)
-
-    def value_at(x: Array, p: Array) -> float:
-        moved = replace(nlp, arguments=p)
-        return moved.evaluate(close_equations(moved, x)).F
-
-    size = nlp.objective_size
-    for i in [k for k in range(nlp.n) if k not in inner][:3]:
-        step = 1e-5 * (nlp.upper[i] - nlp.lower[i])
-        ends = [value_at(x + sign * step * np.eye(nlp.n)[i], nlp.arguments) for sign in (1, -1)]
-        assert found["gradient"][i] == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-4, abs=1e-6 * size)
+    nlp, functions = given.nlp, given.source.functions
+    if not (functions.closure or functions.levels):
+        pytest.skip("no closed loops, and no level")
+    assert functions.slopes is not None
+    x, p = starting_point(nlp), np.array(nlp.arguments)
+    inner, poses = list(nlp.program.places.inner), list(functions.followers)
+    rows = list(functions.closure)
+    level = nlp.program.places.epigraph
+    if level is None:
+        x = closed(nlp, x, p, rows, [*inner, *poses])
+    else:
+        x = nlp.lower + (nlp.upper - nlp.lower) * np.random.default_rng(3).uniform(0.3, 0.7, nlp.n)
+        x[level.level] = worst(nlp, x, p)
+    found = run(tmp_path, given, [{"x": x.tolist(), "p": p.tolist(), "pose": 0}])["points"][0]
+    followed = {*inner, *([] if level is None else [level.level])}
+    largest = max(abs(each) for each in found["gradient"] if each is not None)
+    slopes = np.asarray(nlp.program.kernels.derivatives(x, p).jacobian)[rows]
+    for i in [k for k in range(nlp.n) if k not in followed]:
+        step = 1e-5 * (nlp.upper[i] - nlp.lower[i]) * np.eye(nlp.n)[i]
+        free = [*inner, *(each for each in poses if each != i)]
+        if found["gradient"][i] is None:  # the loops do not let it move
+            ranks = [np.linalg.matrix_rank(slopes[:, own], rtol=1e-9) for own in (free, [*free, i])]
+            assert ranks[0] < ranks[1]
+            continue
+        ends = [worst(nlp, closed(nlp, x + sign * step, p, rows, free), p) for sign in (1, -1)]
+        assert found["gradient"][i] == pytest.approx((ends[0] - ends[1]) / (2 * step[i]), rel=1e-4, abs=1e-6 * largest)
+    for place in [each for each in nlp.program.places.numbers if each.vector == "p"][:3]:
+        i = place.index
+        step = 1e-5 * max(1e-2, abs(p[i])) * np.eye(len(p))[i]
+        pairs = [(x, p + sign * step) for sign in (1, -1)]
+        ends = [worst(nlp, closed(nlp, a, b, rows, [*inner, *poses]), b) for a, b in pairs]
+        own = (ends[0] - ends[1]) / (2 * step[i])
+        assert found["slopes"][i] == pytest.approx(own, rel=1e-4, abs=1e-6 * max(largest, abs(own)))
 
 
 def test_modules_are_compiled_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

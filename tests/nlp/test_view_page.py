@@ -1,6 +1,7 @@
 """Live pages in a real browser: what they compute, what they say about it, and what they give out again."""
 
 import json
+import math
 import re
 import shlex
 import shutil
@@ -15,6 +16,7 @@ from pages import Page
 
 from screwsynth.nlp import load_case, shipped_cases, solve
 from screwsynth.nlp.evidence.evaluation import starting_point
+from screwsynth.nlp.evidence.loads import loads_at
 from screwsynth.nlp.evidence.state import evaluate
 from screwsynth.nlp.output.live import page as live_page
 from screwsynth.nlp.output.live.page import SCRIPTS, script_text
@@ -134,7 +136,7 @@ def test_evaluation_shows_violated_limits(live: Callable[..., Live]) -> None:
     violated = page.chrome.execute_script(
         "return [...document.querySelectorAll('.limit.violated')].map((each) => each.textContent)"
     )
-    assert any("footprint.base" in each and "violated" in each for each in violated)
+    assert any("base joints, radius" in each and "violated" in each for each in violated)
     assert_words(*page.shown("words"), "nothing is optimised", "violated")
 
 
@@ -337,6 +339,132 @@ def test_a_map_has_the_values_of_evaluate_and_moves_the_robot(live: Callable[...
     });"""
     (_, across), (_, up) = page.chrome.execute_async_script(click)
     assert (across, up) == pytest.approx((0.25, 0.6), abs=0.02)
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_two_fingers_on_the_platform_turn_it(live: Callable[..., Live]) -> None:
+    page = live("hexapod-machining", width=420)
+    page.click("mode-evaluate")
+    pull = """
+    const done = arguments[0], canvas = document.getElementById("robot"), { state } = screwsynth;
+    const box = canvas.getBoundingClientRect(), [x, y] = screwsynth.place();
+    const at = (type, pointerId, dx, dy) => canvas.dispatchEvent(new PointerEvent(type, {
+      pointerId, clientX: box.left + x + dx, clientY: box.top + y + dy, bubbles: true }));
+    canvas.setPointerCapture = () => {};
+    at("pointerdown", 1, 0, 0);
+    at("pointerdown", 2, 60, 0);
+    at("pointermove", 1, 0, 6);
+    at("pointermove", 2, 60, -6);
+    at("pointerup", 1, 0, 6);
+    at("pointerup", 2, 60, -6);
+    requestAnimationFrame(() => requestAnimationFrame(() => done([...state.module.arrays.x])));"""
+    before = page.chrome.execute_script("return [...screwsynth.state.module.arrays.x]")
+    turned = page.chrome.execute_async_script(pull)
+    assert turned[:7] == before[:7]
+    # About the direction to the viewer, by the angle between both lines of the fingers.
+    change = math.dist(turned[7:], before[7:])
+    assert 0.5 * math.atan2(12, 60) * 0.5 < change < 0.5 * math.atan2(12, 60) * 1.5
+    assert page.faults == []
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_cursor_on_the_map_moves_the_robot(live: Callable[..., Live]) -> None:
+    page = live("hexapod-spindle")
+    page.click("mode-evaluate")
+    page.chrome.execute_script("document.getElementById('map-group').open = true")
+    page.chrome.execute_async_script(
+        "const look = () => document.getElementById('map-words').textContent"
+        " ? arguments[0](true) : setTimeout(look, 20); look();"
+    )
+    assert_words(*page.shown("map-words"), "dashed: the workspace")
+    names = page.chrome.execute_script(
+        "return [...document.getElementById('map-what').options].map((each) => each.textContent)"
+    )
+    assert_words(" ".join(names), "singular", "nearest limit", "actuator force", "actuator speed")
+    page.chrome.find_element("id", "map").send_keys("\ue014\ue014\ue013")  # right, right, up
+    assert_words(*page.shown("map-cursor"), "Cursor at p_x", "Enter moves")
+    before = page.chrome.execute_script("return [...screwsynth.state.module.arrays.p]")
+    page.chrome.find_element("id", "map").send_keys("\ue007")
+    page.chrome.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    after = page.chrome.execute_script("return [...screwsynth.state.module.arrays.p]")
+    moved = [k for k, each in enumerate(before) if after[k] != each]
+    assert len(moved) == 2
+    assert all(after[k] > before[k] for k in moved)
+    assert page.faults == []
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_the_worst_pose_of_a_workspace_is_sampled_and_says_so(live: Callable[..., Live]) -> None:
+    page = live("hexapod-spindle")
+    home = page.chrome.execute_script("return screwsynth.state.leastMargin()")
+    page.click("to-worst")
+    assert_words(*page.shown("words"), "worst of", "poses of the workspace", "sampled", "not proved")
+    least, sliders = page.chrome.execute_script(
+        "const { state } = screwsynth; return [state.leastMargin(), state.sliders.map((e) => [e.name, state.read(e)])]"
+    )
+    position = {name: value for name, value in sliders if name.startswith("p_")}
+    assert least < home
+    assert abs(position["p_x"]) <= 3
+    assert abs(position["p_y"]) <= 3
+    assert 17 <= position["p_z"] <= 23
+    # The nearest limit is that of the program at the same pose: the speed of an actuator, at most 10 in/s.
+    settings = dict(each.split("=") for each in shlex.split(page.copied("copy-set"))[4::2])
+    nlp = formulate(load_case("hexapod-spindle", {key: float(text) for key, text in settings.items()}))
+    x = starting_point(nlp)
+    speeds = [abs(each.value) for each in loads_at(nlp, x, evaluate(nlp, x)).speeds]
+    margin = (10 - max(speeds)) / max(10, *speeds)
+    assert least <= margin + 1e-9
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_path: Path) -> None:
+    page = live("peg-in-hole")
+    page.click("mode-evaluate")
+    page.chrome.execute_script("document.getElementById('tasks-group').open = true")
+    ranges = [
+        each
+        for each in page.chrome.find_elements("css selector", "#tasks input[type=range]")
+        if str(each.get_attribute("aria-label")).endswith("weight")
+    ]
+    assert len(ranges) == 2
+    before = page.F
+    page.chrome.execute_async_script(
+        "const [range, done] = arguments; range.value = '1.5'; range.dispatchEvent(new Event('input'));"
+        "requestAnimationFrame(() => requestAnimationFrame(done));",
+        ranges[0],
+    )
+    assert before != page.F
+    command = shlex.split(page.copied("copy-set"))
+    assert any(each.startswith("task[0].weight=") for each in command)
+    target = tmp_path / "evaluated.json"
+    assert cli(*command[1:], "--json", str(target))[0] in (0, 1)
+    found = json.loads(target.read_text())
+    weights = [float(each.split("=")[1]) for each in command if ".weight=" in each]
+    signs = page.chrome.execute_script("return screwsynth.state.data.tasks.map((each) => each.sense)")
+    values = [each["F"] for each in found["tasks"]]
+    size = 2 / sum(weights)
+    mixed = len(set(signs)) > 1
+    total = sum(
+        size * weight * value * (-1 if mixed and sign == "min" else 1)
+        for weight, value, sign in zip(weights, values, signs, strict=True)
+    )
+    assert pytest.approx(total, rel=1e-9) == page.F
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_refused_cases_and_rounding_errors_have_plain_words(live: Callable[..., Live]) -> None:
+    page = live("agile-eye")
+    words = page.chrome.find_element("id", "controls").text
+    assert_words(words, "optimises F only", "actuator speed")
+    assert not re.search(r"\.toml|objective|[\"_]", words)
+    page = live("paper-4.4-snu")
+    page.click("mode-evaluate")
+    assert_words(*page.shown("F"), "= 0 ")
 
 
 def test_types_of_scripts(tmp_path: Path) -> None:

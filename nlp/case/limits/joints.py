@@ -247,6 +247,15 @@ class JointAngle(Limit[float | ConeTable], abc.ABC):
         ]
         return Measures(tuple(leg.name for leg in robot.legs), ca.vertcat(*angles), Dimension.ANGLE)
 
+    def cones(self, robot: RobotInstance) -> list[SX]:
+        """Return the centre and the unit axis (6, 1) of each joint's cone in the world frame."""
+        rows = zip(robot.legs, self._mounting_axes(robot), strict=True)
+        # The axis points into the cone: from base to platform at the base, and from the platform to the base there.
+        if self.plate == "base":
+            return [ca.vertcat(leg.base, axis) for leg, axis in rows]
+        R, p = robot.rotation, robot.position
+        return [ca.vertcat(p + R @ leg.platform, -(R @ axis)) for leg, axis in rows]
+
     def at_pose(self, pose: PosedRobot) -> Iterator[BoundedConstraint]:
         """Return the constraint on the cosine of each joint's angle."""
         robot = pose.robot

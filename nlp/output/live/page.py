@@ -37,7 +37,21 @@ from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
 from .casefile import case_parts, stated_tasks
 
 #: Modules of the page in the order of their imports.
-SCRIPTS = ("numbers.js", "module.js", "state.js", "text.js", "scene.js", "canvas.js", "panel.js", "map.js", "main.js")
+SCRIPTS = (
+    "numbers.js",
+    "names.js",
+    "module.js",
+    "state.js",
+    "text.js",
+    "scene.js",
+    "canvas.js",
+    "panel.js",
+    "tasks.js",
+    "bars.js",
+    "jumps.js",
+    "map.js",
+    "main.js",
+)
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=const|class)", re.MULTILINE)
 #: Statuses of the module in words, by code.

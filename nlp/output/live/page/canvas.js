@@ -24,7 +24,7 @@ export class Picture {
     this.changed = changed;
     /** Last projection: directions, and pixels of the page per length. */
     this.last = { axes: axesOf(view), scale: 1, place: (/** @type {Vector} */ each) => [each[0], each[1]] };
-    /** @type {((x: number, y: number, turns: boolean) => ((across: number, up: number) => void) | null) | null} takes hold of the platform */
+    /** @type {((x: number, y: number, turns: boolean) => ((across: number, up: number, twist?: number) => void) | null) | null} takes hold of the platform */
     this.grab = null;
     this.listen();
   }
@@ -195,13 +195,21 @@ export class Picture {
     /** @type {Map<number, { x: number, y: number }>} */
     const fingers = new Map();
     let apart = 0;
-    /** @type {{ pull: (across: number, up: number) => void, x: number, y: number } | null} */
+    /** @type {{ pull: (across: number, up: number, twist?: number) => void, x: number, y: number, angle: number } | null} */
     let grabbed = null;
+    /** Middle of two fingers, and the angle of their line. */
+    const pair = () => {
+      const [a, b] = [...fingers.values()];
+      return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, angle: Math.atan2(a.y - b.y, b.x - a.x) };
+    };
     canvas.addEventListener("pointerdown", (event) => {
       const box = canvas.getBoundingClientRect();
-      const pull = fingers.size ? null : (this.grab?.(event.clientX - box.left, event.clientY - box.top, event.shiftKey) ?? null);
-      grabbed = pull && { pull, x: event.clientX, y: event.clientY };
+      const before = [...fingers.values()][0];
       fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      // A second finger, while the first one has the platform, turns it.
+      const isSecond = fingers.size === 2 && grabbed !== null, held = isSecond ? before : { x: event.clientX, y: event.clientY };
+      const pull = fingers.size === 1 || isSecond ? (this.grab?.(held.x - box.left, held.y - box.top, event.shiftKey || isSecond) ?? null) : null;
+      grabbed = pull && { pull, ...(isSecond ? pair() : { x: event.clientX, y: event.clientY, angle: 0 }) };
       canvas.setPointerCapture(event.pointerId);
       apart = 0;
     });
@@ -212,6 +220,11 @@ export class Picture {
       fingers.set(event.pointerId, now);
       if (fingers.size === 1 && grabbed) {
         grabbed.pull((now.x - grabbed.x) / this.last.scale, (grabbed.y - now.y) / this.last.scale);
+        return;
+      }
+      if (fingers.size === 2 && grabbed) {
+        const two = pair(), twist = Math.atan2(Math.sin(two.angle - grabbed.angle), Math.cos(two.angle - grabbed.angle));
+        grabbed.pull((two.x - grabbed.x) / this.last.scale, (grabbed.y - two.y) / this.last.scale, twist);
         return;
       }
       if (fingers.size === 1) this.turn(-0.5 * (now.x - before.x), 0.4 * (now.y - before.y));

@@ -2,9 +2,12 @@
 import { CaseModule } from "./module.js";
 import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
-import { axesOf, colourOf, extentOf, piecesOf, robotOf } from "./scene.js";
+import { axesOf, colourOf, conesOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
-import { LimitBars, Sliders, TaskFields, byId, showValues } from "./panel.js";
+import { Sliders, byId, make, showValues } from "./panel.js";
+import { TaskSliders } from "./tasks.js";
+import { LimitBars, showActuators } from "./bars.js";
+import { addJumps } from "./jumps.js";
 import { ValueMap } from "./map.js";
 import { plus } from "./numbers.js";
 
@@ -19,7 +22,7 @@ const data = JSON.parse(byId("data").textContent ?? "{}");
 let state = null;
 const colours = () => {
   const style = getComputedStyle(document.documentElement), get = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
-  return { ink: get("ink"), muted: get("muted"), line: get("line"), halo: get("back"), purple: get("purple"), rail: get("rail"), joint: get("joint"), baseFace: get("base-face"), platformFace: get("platform-face"), baseEdge: get("base-edge"), platformEdge: get("platform-edge") };
+  return { ink: get("ink"), muted: get("muted"), line: get("line"), halo: get("back"), purple: get("purple"), rail: get("rail"), joint: get("joint"), baseFace: get("base-face"), platformFace: get("platform-face"), baseEdge: get("base-edge"), platformEdge: get("platform-edge"), bad: get("bad"), cone: get("cone") };
 };
 let palette = colours();
 const picture = new Picture(/** @type {HTMLCanvasElement} */ (byId("robot")), data.camera, () => draw());
@@ -47,6 +50,16 @@ const limbValues = (view) => {
   return { found, part: (/** @type {string | null} */ limb) => (found.get(limb ?? "") ?? 0) / most };
 };
 
+/** Half angle of a joint's cone, and whether its limit is violated there at the shown pose. @param {string} key @param {number} index */
+const coneLimit = (key, index) => {
+  if (!state) return null;
+  const own = state.sides.filter((/** @type {any} */ each) => each.key === key), count = own.length / data.poses;
+  const side = own[state.pose * count + index];
+  if (!side) return null;
+  const { limit, margin } = state.measure(side);
+  return { limit, isViolated: margin < -1e-6 };
+};
+
 const draw = () => {
   const view = state ? state.module.arrays.view : data.view;
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
@@ -55,7 +68,7 @@ const draw = () => {
   const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
   if (!picture.fitted.length) picture.fitted = extentOf(robot, data.scene, twist);
-  const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist });
+  const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist, cones: conesOf(view, data, coneLimit) });
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();
   for (const link of data.scene.links) {
@@ -73,6 +86,7 @@ const show = () => {
     sliders?.refresh();
     fields?.refresh();
     showValues(state, bars?.refresh() ?? []);
+    showActuators(state);
     map?.refresh();
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
@@ -84,7 +98,7 @@ const show = () => {
 let sliders;
 /** @type {ValueMap | undefined} */
 let map;
-/** @type {TaskFields | undefined} */
+/** @type {TaskSliders | undefined} */
 let fields;
 /** @type {LimitBars | undefined} */
 let bars;
@@ -140,10 +154,10 @@ const grab = (x, y, turns) => {
   const robot = robotOf(own.module.arrays.view, data.blocks, data.scene);
   const corners = (data.scene.plates.platform ?? data.scene.corners).map((/** @type {number} */ k) => place(robot.points[k]));
   if (!isOn(x, y, [...corners]) && Math.hypot(...place(robot.position).map((each, k) => each - [x, y][k])) > 16) return null;
-  const quaternion = own.quaternion();
-  if (turns && quaternion) {
-    const from = quaternion.map((index) => own.module.arrays.x[index]), size = data.scene.size;
-    return (across, up) => change(() => own.turn(from, [0, 1, 2].map((k) => (axes.up[k] * across - axes.right[k] * up) / (0.6 * size))), "grab");
+  const from = own.rotation();
+  if (turns && from.length) {
+    const size = data.scene.size;
+    return (across, up, twist = 0) => change(() => own.turn(from, [0, 1, 2].map((k) => (axes.up[k] * across - axes.right[k] * up) / (0.6 * size) + axes.towards[k] * twist)), "grab");
   }
   const begin = own.positions().map((slider) => (slider ? own.module.arrays[slider.vector][slider.index] : 0));
   return (across, up) => change(() => own.place(begin.map((each, k) => each + axes.right[k] * across + axes.up[k] * up)), "grab");
@@ -170,6 +184,10 @@ const listen = () => {
 };
 
 byId("colour").addEventListener("change", draw);
+// Both buttons stay on one line.
+const buttons = make("span", { class: "together" });
+byId("view-reset").before(buttons);
+buttons.append(byId("view-reset"), byId("view-fit"));
 byId("view-reset").addEventListener("click", () => picture.reset());
 byId("view-fit").addEventListener("click", () => {
   picture.fitted = [];
@@ -188,6 +206,9 @@ poseChoice?.addEventListener("change", () => change(() => {
   state.look();
 }));
 
+// Texts that the program wrote get the minus signs of the page.
+for (const each of document.querySelectorAll("#stated-task p, #F")) each.textContent = (each.textContent ?? "").replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
+document.documentElement.classList.toggle("still", !data.has_module);
 show();
 if (data.has_module) {
   const loaded = await CaseModule.load(await unpack(byId("module").textContent ?? ""), data.arrays);
@@ -195,8 +216,9 @@ if (data.has_module) {
   if (location.hash.length > 1) takeFragment(state, location.hash);
   sliders = new Sliders(state, change);
   bars = new LimitBars(state, change);
-  fields = new TaskFields(state, change);
+  fields = new TaskSliders(state, change);
   map = new ValueMap(state, change);
+  addJumps(state, change);
   listen();
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);

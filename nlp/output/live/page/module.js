@@ -60,6 +60,15 @@ export class CaseModule {
     return { status, F: solution_F[0], violation: violation[0], residual: residual[0] };
   }
 
+  /**
+   * Closes the loops at x by the smallest change of joint coordinates, and of poses if they follow; false where it cannot.
+   * @param {number} moved index in x of a coordinate that stays; -1 for none
+   * @param {boolean} withPoses
+   */
+  closeLoops(moved, withPoses) {
+    return this.exports.close_loops(moved, withPoses ? 1 : 0) === 0;
+  }
+
   /** Rank of J at the last evaluated pose. */
   rank() {
     return this.exports.rank();

@@ -1,4 +1,4 @@
-// Numbers as text, with the digits of the terminal, and small vector algebra.
+// Numbers as text, with the digits of the terminal and proper minus signs, text as numbers, and small vector algebra.
 
 /**
  * Number with a count of significant digits, as Python's format ``g`` writes it.
@@ -6,7 +6,16 @@
  * @param {number} [count]
  * @returns {string}
  */
-export const digits = (value, count = 7) => {
+export const digits = (value, count = 7) => plain(value, count).replace(/-/g, "\u2212");
+
+/** Number that a person wrote, with a comma or a point, and any minus sign; NaN for other text. @param {string} text */
+export const parsed = (text) => {
+  const own = text.trim().replace(",", ".").replace(/\u2212/g, "-");
+  return own === "inf" ? Infinity : own === "" ? NaN : Number(own);
+};
+
+/** @param {number} value @param {number} count */
+const plain = (value, count) => {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "?" : value > 0 ? "inf" : "-inf";
   if (value === 0) return "0";
   const [mantissa, power] = value.toExponential(count - 1).split("e");

@@ -1,5 +1,6 @@
-// Controls and values beside the picture: sliders, limits, headline, actuators.
-import { digits, measured, settled } from "./numbers.js";
+// Controls and values beside the picture: sliders, headline and values of the point.
+import { digits, measured, parsed, settled } from "./numbers.js";
+import { turnWords } from "./names.js";
 import { rotationsOf } from "./text.js";
 
 /**
@@ -35,9 +36,12 @@ const padlock = (isClosed) => {
 };
 
 /** Text that is set only where it differs, so that a page is laid out once. @param {Element} element @param {string} text */
-const say = (element, text) => {
+export const say = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
+
+/** Name that may break after an underscore. @param {string} name @returns {(Node | string)[]} */
+const breakable = (name) => name.split(/(?<=_)/).flatMap((part, k) => (k ? [document.createElement("wbr"), part] : [part]));
 
 /** Rows with a slider for each value. */
 export class Sliders {
@@ -66,14 +70,14 @@ export class Sliders {
     if (isFixed) lock.disabled = true;
     range.addEventListener("input", () => change(() => state.move(slider, Number(range.value)), slider));
     entry.addEventListener("change", () => {
-      const value = Number(entry.value.replace(",", ".").replace("\u2212", "-"));
-      const isIn = Number.isFinite(value) && entry.value.trim() !== "" && (isFixed || (value >= low - 1e-12 * Math.abs(low) && value <= high + 1e-12 * Math.abs(high)));
+      const value = parsed(entry.value);
+      const isIn = Number.isFinite(value) && (isFixed || (value >= low - 1e-12 * Math.abs(low) && value <= high + 1e-12 * Math.abs(high)));
       entry.setAttribute("aria-invalid", String(!isIn));
       entry.title = isIn ? "" : `a number from ${digits(low)} to ${digits(high)}`;
       if (isIn) change(() => state.move(slider, isFixed ? value : Math.max(low, Math.min(high, value))));
     });
     lock.addEventListener("click", () => change(() => state.hold(slider, !state.isHeld(slider))));
-    const label = make("label", { for: id }, slider.name), unit = make("span", { class: "unit" }, slider.unit);
+    const label = make("label", { for: id }, ...breakable(slider.name)), unit = make("span", { class: "unit" }, slider.unit);
     const element = make("div", { class: "slider" }, label, range, entry, unit, lock, slope);
     return { slider, element, range, entry, lock, bar, slope };
   }
@@ -109,103 +113,12 @@ export class Sliders {
   }
 }
 
-/** Fields for axis, point and pitch of each task. */
-export class TaskFields {
-  /** @param {State} state @param {(act: () => void, key?: any) => void} change */
-  constructor(state, change) {
-    this.state = state;
-    /** @type {{ entry: any, read: () => number }[]} */
-    this.fields = [];
-    const length = state.data.units.length;
-    const units = /** @type {Record<string, string>} */ ({ axis: "", point: length, pitch: `${length}/rad` });
-    state.data.stated_tasks.forEach((/** @type {any} */ stated, /** @type {number} */ task) => {
-      if (stated.axis && state.tasks.length > 1) byId("tasks").append(make("p", { class: "task-name" }, state.data.tasks[task].name));
-      for (const key of /** @type {const} */ (["axis", "point", "pitch"])) {
-        if (stated[key] === undefined) continue;
-        const count = key === "pitch" ? 1 : 3, name = `${state.data.tasks[task].name}: ${key}`;
-        const entries = Array.from({ length: count }, (_, place) => this.field(task, key, place, count > 1 ? `${name}, ${"xyz"[place]}` : name, change));
-        byId("tasks").append(make("div", { class: "task-row" }, make("span", { class: "name" }, key), ...entries, make("span", { class: "unit" }, units[key])));
-      }
-    });
-    byId("tasks-group").hidden = !this.fields.length;
-  }
-
-  /** @param {number} task @param {"axis" | "point" | "pitch"} key @param {number} place @param {string} name @param {(act: () => void) => void} change */
-  field(task, key, place, name, change) {
-    const entry = make("input", { type: "text", inputmode: "text", class: "entry", "aria-label": name, autocomplete: "off" });
-    entry.addEventListener("change", () => change(() => {
-      const text = entry.value.trim().replace(",", "."), value = text === "inf" ? Infinity : text === "" ? NaN : Number(text);
-      entry.setAttribute("aria-invalid", String(!this.state.setTask(task, key, place, value)));
-    }));
-    this.fields.push({ entry, read: () => (key === "pitch" ? this.state.tasks[task].pitch : this.state.tasks[task][key][place]) });
-    return entry;
-  }
-
-  refresh() {
-    for (const { entry, read } of this.fields) {
-      const text = digits(read());
-      if (document.activeElement !== entry && entry.value !== text) entry.value = text;
-    }
-  }
-}
-
-/** Bars of the limits with editable values. */
-export class LimitBars {
-  /** @param {State} state @param {(act: () => void, key?: any) => void} change */
-  constructor(state, change) {
-    this.state = state;
-    this.change = change;
-    /** @type {Map<string, any>} */
-    this.rows = new Map();
-  }
-
-  refresh() {
-    const states = this.state.limitStates();
-    for (const each of states) {
-      if (!this.rows.has(each.key)) this.add(each);
-      const { element, value, fill, mark, entry } = this.rows.get(each.key);
-      const shown = each.value * each.factor, isKnown = Number.isFinite(shown), limit = each.limit * each.factor;
-      const at = isKnown ? shown : limit, low = Math.min(0, at, limit), high = Math.max(at, limit, low + 1e-300) * (Math.max(at, limit) > 0 ? 1.12 : 1);
-      const part = (/** @type {number} */ value) => `${Math.max(0, Math.min(100, (100 * (value - low)) / (high - low))).toFixed(1)}%`;
-      element.classList.toggle("violated", each.isViolated);
-      say(value, `${isKnown ? digits(settled(shown, limit), 5) : each.isViolated ? "" : "satisfied"}${each.isViolated ? " violated" : ""}`);
-      element.title = each.name;
-      fill.style.width = isKnown ? part(shown) : "0";
-      mark.style.left = part(limit);
-      if (entry && document.activeElement !== entry) entry.value = digits(limit);
-    }
-    byId("limits-group").hidden = !states.length;
-    return states;
-  }
-
-  /** @param {import("./state.js").LimitState} each */
-  add(each) {
-    const { state } = this, value = make("output", { class: "value" });
-    const fill = make("i", {}), mark = make("b", {}), bar = make("span", { class: "track" }, fill, mark);
-    /** @type {any} */
-    let entry = null;
-    const sign = each.side === "min" ? "\u2265" : "\u2264";
-    if (each.settable >= 0) {
-      entry = make("input", { type: "text", inputmode: "decimal", class: "entry", "aria-label": `limit ${each.key}`, autocomplete: "off" });
-      entry.addEventListener("change", () => this.change(() => {
-        const isSet = state.setLimit(each.settable, Number(entry.value.replace(",", ".")));
-        entry.setAttribute("aria-invalid", String(!isSet));
-      }));
-    }
-    const stated = entry ?? make("span", { class: "entry" }, digits(each.limit * each.factor));
-    const name = make("span", { class: "name" }, each.key.replace(/\.(min|max)$/, ""));
-    const element = make("div", { class: "limit" }, name, value, make("span", { class: "sign" }, sign), stated, make("span", { class: "unit" }, each.unit), bar);
-    byId("limits").append(element);
-    this.rows.set(each.key, { element, value, fill, mark, entry });
-  }
-}
-
 /** Headline, and the values of the point. @param {State} state @param {import("./state.js").LimitState[]} limits */
 export const showValues = (state, limits) => {
-  const { data, module } = state, { F, singular_values } = module.arrays;
+  const { data, module } = state, { singular_values } = module.arrays;
   const { word, words, isFault } = state.headline();
   const violated = limits.filter((each) => each.isViolated).length;
-  const value = state.fault & 3 ? NaN : F[0];
+  const value = state.shownF();
   const extreme = state.kind === "program" && data.tasks.length === 1 ? (data.sense === "max" ? "largest " : "smallest ") : "";
   say(byId("F"), `${extreme}${data.F_name} = ${measured(value, data.F_unit)}`);
   say(byId("word"), word);
@@ -215,32 +128,11 @@ export const showValues = (state, limits) => {
   byId("stated-task").hidden = state.hasOtherTask();
   const rank = module.rank();
   say(byId("rank"), `${rank}${rank < 6 ? " (singular)" : ""}`);
-  say(byId("singular"), digits(singular_values[5], 5));
-  byId("singular-row").hidden = data.has_members;
-  const turns = rotationsOf(state).map((/** @type {any} */ each) => `${each.axis.map((/** @type {number} */ part) => digits(settled(part, 1), 5)).join("  ")}, ${measured(settled(each.angle, 180), data.units.angle)}`);
+  say(byId("singular"), digits(settled(singular_values[5], singular_values[0]), 5));
+  const turns = rotationsOf(state).map((/** @type {any} */ each) => turnWords(each, data.units.angle));
   say(byId("turn"), turns.join("; "));
   byId("turn-row").hidden = !turns.length;
   say(byId("time"), `${(1000 * state.seconds).toFixed(1)} ms`);
   byId("time-row").hidden = !state.seconds;
   byId("to-answer").hidden = !data.answer;
-  showActuators(state);
-};
-
-/** @param {State} state */
-const showActuators = (state) => {
-  const { data, module } = state, { blocks } = data, { view } = module.arrays;
-  const body = byId("actuators");
-  if (!blocks.largest) return;
-  const count = data.actuators.length, speeds = blocks.speeds[1] > 0;
-  data.actuators.forEach((/** @type {any} */ each, /** @type {number} */ k) => {
-    /** @type {string[]} */
-    const cells = [each.name];
-    data.loads.forEach((/** @type {string} */ _, /** @type {number} */ load) => {
-      const [high, low] = ["largest", "smallest"].map((name) => view[blocks[name][0] + load * count + k]);
-      cells.push(digits(Math.abs(high) >= Math.abs(low) ? high : low, 5));
-    });
-    if (speeds) cells.push(digits(view[blocks.speeds[0] + k] * each.factor, 5));
-    const row = body.children[k] ?? body.appendChild(make("tr", {}, ...cells.map((_, i) => make(i ? "td" : "th", {}))));
-    cells.forEach((text, i) => say(row.children[i], text));
-  });
 };

@@ -7,6 +7,7 @@ import { cross, norm, plus, unitOf, dot } from "./numbers.js";
  * @typedef {{ kind: "line" | "face" | "dot", points: Vector[], colour: string, width: number, depth: number,
  *   edge?: string, dash?: boolean, limb?: string, head?: boolean }} Piece
  * @typedef {{ points: Vector[], circles: Vector[][], joints: Vector[][], position: Vector }} Robot
+ * @typedef {{ centre: Vector, axis: Vector, angle: number, isViolated: boolean }} Cone
  * @typedef {{ ends: [number, number], limb: string | null, body: string, kind: string, row: number | null }} LinkData
  */
 
@@ -44,6 +45,18 @@ export const robotOf = (view, blocks, scene) => {
   let at = 0;
   const joints = scene.joints.map((/** @type {{ axes: number }} */ { axes }) => all.slice(at, (at += 1 + axes)));
   return { points: vectors("points"), circles: circles.map((_, k) => circles.slice(k, k + 3)).filter((_, k) => k % 3 === 0), joints, position: vectors("position")[0] };
+};
+
+/** Cones of joints with a limited angle. @param {ArrayLike<number>} view @param {any} data @param {(key: string, index: number) => { limit: number, isViolated: boolean } | null} look @returns {Cone[]} */
+export const conesOf = (view, data, look) => {
+  let at = data.blocks.cones[0];
+  return data.cones.flatMap((/** @type {{ count: number, key: string, angle: number }} */ { count, key, angle }) =>
+    Array.from({ length: count }, (_, k) => {
+      const parts = Array.from({ length: 6 }, (_, i) => view[at + i]), own = look(key, k);
+      at += 6;
+      return { centre: /** @type {Vector} */ (parts.slice(0, 3)), axis: /** @type {Vector} */ (parts.slice(3)), angle: own ? own.limit : angle, isViolated: Boolean(own?.isViolated) };
+    }),
+  );
 };
 
 /** Straight line in pieces. @param {Piece[]} into @param {Vector} a @param {Vector} b @param {Partial<Piece> & { colour: string, width: number }} style @param {Axes} axes @param {number} [parts] */
@@ -113,10 +126,10 @@ const addMotion = (into, twist, robot, scene, axes, colours) => {
  * All pieces in painting order.
  * @param {Robot} robot
  * @param {any} scene
- * @param {{ axes: Axes, colours: Record<string, string>, limbColour: (link: LinkData) => string, twist: number[] | null, isFaint?: boolean }} how
+ * @param {{ axes: Axes, colours: Record<string, string>, limbColour: (link: LinkData) => string, twist: number[] | null, cones?: Cone[], isFaint?: boolean }} how
  * @returns {Piece[]}
  */
-export const piecesOf = (robot, scene, { axes, colours, limbColour, twist, isFaint = false }) => {
+export const piecesOf = (robot, scene, { axes, colours, limbColour, twist, cones = [], isFaint = false }) => {
   /** @type {Piece[]} */
   const found = [];
   const depth = (/** @type {Vector[]} */ points) => points.reduce((sum, each) => sum + dot(each, axes.towards), 0) / points.length;
@@ -147,6 +160,14 @@ export const piecesOf = (robot, scene, { axes, colours, limbColour, twist, isFai
   if (!robot.joints.length) {
     const ends = new Set(/** @type {LinkData[]} */ (scene.links).filter((each) => each.limb !== null).flatMap((each) => each.ends));
     for (const k of ends) found.push({ kind: "dot", points: [robot.points[k]], colour: colours.joint, width: 4.2, depth: depth([robot.points[k]]) + 0.02 * scene.size });
+  }
+  for (const { centre, axis, angle, isViolated } of cones) {
+    // A circle about the axis at a fixed distance along the cone, and four lines to its tip.
+    const long = 0.13 * scene.size, unit = unitOf(axis), other = /** @type {Vector} */ (Math.abs(unit[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0]);
+    const arm = /** @type {Vector} */ (unitOf(cross(unit, other)).map((each) => each * long * Math.sin(angle)));
+    const path = arcOf(plus(centre, unit, long * Math.cos(angle)), unit, arm, 2 * Math.PI, 0, 24), style = { colour: isViolated ? colours.bad : colours.cone, width: isViolated ? 2 : 1 };
+    path.slice(1).forEach((to, k) => addLine(found, path[k], to, style, axes, 1));
+    for (let k = 0; k < 24; k += 6) addLine(found, centre, path[k], style, axes, 1);
   }
   if (twist) addMotion(found, twist, robot, scene, axes, colours);
   return found.filter((each) => each.points.every((point) => point.every(Number.isFinite))).sort((a, b) => a.depth - b.depth);

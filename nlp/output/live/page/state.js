@@ -14,6 +14,8 @@ import { STATUSES } from "./module.js";
 
 /** Violation of a limit, relative to it, that counts as rounding. */
 const ROUNDING = 1e-6;
+/** F below this part of its terms is rounding error, as in `nlp/evidence/state.py`. */
+const ZERO_F = 1e-12;
 /** Seeds of a solve that follows a slider where the search from the last point fails. */
 const FEW_SEEDS = 4;
 /** Random starts of the search for other local optima. */
@@ -49,6 +51,11 @@ export class State {
     this.rowHigh = module.arrays.g_upper.slice();
     /** @type {{ axis: number[], point: number[], pitch: number }[]} tasks as they are now */
     this.tasks = [];
+    /** @type {number[]} weights of several tasks as they are now */
+    this.weights = [];
+    /** Words about the point from the search that led to it. */
+    this.remark = "";
+    this.sides = this.sidesOfRows();
     /** @type {number[][]} other local optima */
     this.others = [];
     this.jump("answer");
@@ -133,15 +140,16 @@ export class State {
    * Sets a value of a task; false where it has no motion.
    * @param {number} index
    * @param {"axis" | "point" | "pitch"} key
-   * @param {number} place component of an axis or point
-   * @param {number} value
+   * @param {number} place component of an axis or point; -1 for all
+   * @param {number | number[]} value
    */
   setTask(index, key, place, value) {
     const task = this.tasks[index], made = { ...task, axis: [...task.axis], point: [...task.point] };
-    if (key === "pitch") made.pitch = value;
+    if (Array.isArray(value)) made[key === "point" ? "point" : "axis"] = value;
+    else if (key === "pitch") made.pitch = value;
     else made[key][place] = value;
     const point = made.point.length ? made.point : [0, 0, 0];
-    if (Number.isNaN(value) || (key !== "pitch" && !Number.isFinite(value))) return false;
+    if ([value].flat().some((each) => Number.isNaN(each) || (key !== "pitch" && !Number.isFinite(each)))) return false;
     const twist = this.module.twist(made.axis, point, made.pitch);
     if (!twist || !twist.every(Number.isFinite)) return false;
     this.tasks[index] = made;
@@ -149,6 +157,46 @@ export class State {
     this.module.arrays.p.set(twist, this.data.tasks[index].twist);
     this.update(null);
     return true;
+  }
+
+  /** Weights of the case, relative to each other; empty for one task. @returns {number[]} */
+  statedWeights() {
+    const { tasks, p } = this.data;
+    return tasks.some((/** @type {{ weight: number }} */ each) => each.weight < 0) ? [] : tasks.map((/** @type {{ weight: number }} */ each) => Math.abs(p[each.weight]));
+  }
+
+  /**
+   * Sets the weight of a task; all weights are scaled to sum to the number of tasks, as the program does.
+   * @param {number} index
+   * @param {number} value
+   */
+  setWeight(index, value) {
+    if (!(value > 0) || !Number.isFinite(value) || !this.weights.length) return false;
+    const { p, case_lower, case_upper } = this.module.arrays, { tasks, level } = this.data, stated = this.statedWeights();
+    this.weights[index] = value;
+    const total = this.weights.reduce((sum, each) => sum + each, 0);
+    const ratios = this.weights.map((each, k) => {
+      const own = (each * this.weights.length) / total, place = tasks[k].weight;
+      p[place] = Math.sign(this.data.p[place]) * own;
+      return Math.max(own / stated[k], stated[k] / own);
+    });
+    // The level of a worst case grows at most as much as a weight or its inverse does.
+    if (level >= 0) [case_lower[level], case_upper[level]] = [this.low[level], this.high[level]].map((each) => each * Math.max(1, ...ratios));
+    this.others = [];
+    this.update(null);
+    return true;
+  }
+
+  /** Values of limits with a stated side, in the order of the rows. */
+  sidesOfRows() {
+    return this.data.rows.flatMap((/** @type {Row} */ row) =>
+      /** @type {const} */ (["min", "max"]).flatMap((side) => {
+        const stated = side === "min" ? row.low : row.high;
+        if (stated === null) return [];
+        const key = row.keys[side === "min" ? 0 : 1] || `${row.name}.${side}`;
+        return [{ row, side, stated, key, settable: this.limits.findIndex((each) => each.key === key) }];
+      }),
+    );
   }
 
   restoreRows() {
@@ -179,6 +227,7 @@ export class State {
    */
   update(moved) {
     const begin = performance.now();
+    this.remark = "";
     if (this.mode === "solve") this.solveFromHere();
     else this.close(moved);
     this.look();
@@ -225,30 +274,11 @@ export class State {
     this.kind = "point";
     this.status = 0;
     if (!this.inner.size) return;
-    const { arrays } = this.module;
-    const rows = new Set(this.data.kept);
-    for (let k = 0; k < arrays.g_lower.length; k += 1) {
-      if (!rows.has(k)) {
-        arrays.g_lower[k] = -1e300;
-        arrays.g_upper[k] = 1e300;
-      }
-    }
-    const poses = new Set(this.sliders.filter((each) => each.group === "pose" && each.vector === "x").map((each) => each.index));
-    for (const follows of [false, true]) {
-      for (let i = 0; i < arrays.x.length; i += 1) {
-        const isFree = this.inner.has(i) || (follows && poses.has(i) && !(moved && moved.vector === "x" && moved.index === i));
-        arrays.lower[i] = isFree ? arrays.case_lower[i] : arrays.x[i];
-        arrays.upper[i] = isFree ? arrays.case_upper[i] : arrays.x[i];
-      }
-      const answer = this.module.solve(true, 0);
-      this.status = answer.violation <= 1e-7 ? 0 : answer.status || 2;
-      if (this.status === 0) {
-        arrays.x.set(arrays.solution);
-        break;
-      }
-    }
-    this.restoreRows();
-    if (this.status) this.kind = "none";
+    const own = moved && moved.vector === "x" ? moved.index : -1;
+    const isClosed = this.module.closeLoops(-1, false) || (this.data.is_following && (this.module.closeLoops(own, true) || (own >= 0 && this.module.closeLoops(-1, true))));
+    if (isClosed) return;
+    this.kind = "none";
+    this.status = 2;
   }
 
   /** Sliders of the position of the shown pose that a hand can move: free ones, or else fixed ones. */
@@ -270,25 +300,50 @@ export class State {
    * @param {number[]} target
    */
   place(target) {
-    /** @type {Slider | null} */
-    let last = null;
     this.positions().forEach((slider, k) => {
       if (!slider) return;
       const isFree = slider.vector === "x", value = isFree ? Math.max(slider.low, Math.min(slider.high, target[k])) : target[k];
       this.module.arrays[slider.vector][slider.index] = value;
-      if (isFree) this.held.add(slider.index);
-      last = slider;
     });
-    this.update(last);
+    this.settle(this.positions());
+  }
+
+  /** Takes the nearest pose that the loops allow, holds its coordinates, and shows it. @param {(Slider | null)[]} moved */
+  settle(moved) {
+    if (this.data.is_following && !this.module.closeLoops(-1, true)) this.status = 2;
+    for (const slider of moved) if (slider?.vector === "x") this.held.add(slider.index);
+    this.update(null);
   }
 
   /**
-   * Turns the platform from a rotation, by a small rotation vector in the world frame.
-   * @param {number[]} from vector part of a unit quaternion
+   * Slider of the angle of the shown pose, and its axis; null for a free axis.
+   * @returns {{ slider: Slider, axis: number[] } | null}
+   */
+  angle() {
+    const stated = this.data.stated_poses[this.pose], axis = this.data.turn_axes[stated];
+    const slider = this.sliders.find((each) => each.set === `${this.data.prefixes[stated]}angle`);
+    return slider && axis?.length ? { slider, axis } : null;
+  }
+
+  /** Rotation of the shown pose for a hand to begin with: vector part of its quaternion, or its angle. */
+  rotation() {
+    const { arrays } = this.module, held = this.angle();
+    return held ? [arrays[held.slider.vector][held.slider.index]] : (this.quaternion() ?? []).map((index) => arrays.x[index]);
+  }
+
+  /**
+   * Turns the platform from a rotation, by a rotation vector in the world frame; about a fixed axis, by its part there.
+   * @param {number[]} from result of `rotation`
    * @param {number[]} turn
    */
   turn(from, turn) {
-    const q = this.quaternion();
+    const q = this.quaternion(), held = this.angle();
+    if (held) {
+      const { slider, axis } = held, size = Math.hypot(...axis), by = turn.reduce((sum, each, k) => sum + (each * axis[k]) / size, 0);
+      const value = slider.vector === "x" ? Math.max(slider.low, Math.min(slider.high, from[0] + by)) : from[0] + by;
+      this.module.arrays[slider.vector][slider.index] = value;
+      this.settle([slider]);
+    }
     if (!q) return;
     const angle = Math.hypot(...turn), part = angle ? Math.sin(angle / 2) / angle : 0, real = Math.cos(angle / 2);
     const a = turn.map((each) => each * part), [x, y, z] = from, w = Math.sqrt(Math.max(0, 1 - x * x - y * y - z * z));
@@ -300,9 +355,8 @@ export class State {
     const { x: point, case_lower, case_upper } = this.module.arrays;
     q.forEach((index, k) => {
       point[index] = Math.max(case_lower[index], Math.min(case_upper[index], made[k]));
-      this.held.add(index);
     });
-    this.update(null);
+    this.settle(this.sliders.filter((each) => each.vector === "x" && q.includes(each.index)));
   }
 
   /** Evaluates everything that is shown. */
@@ -326,6 +380,8 @@ export class State {
     this.rowLow = arrays.g_lower.slice();
     this.rowHigh = arrays.g_upper.slice();
     this.tasks = this.statedTasks();
+    this.weights = this.statedWeights();
+    this.remark = "";
     this.others = [];
     this.kind = "point";
     this.status = 0;
@@ -392,29 +448,52 @@ export class State {
     return true;
   }
 
+  /**
+   * Value of a side of a limit: limit and value in units of computations, excess over the limit, and relative margin.
+   * @param {{ row: Row, side: "min" | "max", stated: number, settable: number }} each
+   */
+  measure({ row, side, stated, settable }) {
+    const { readings, limits, g, g_lower, g_upper } = this.module.arrays, sign = side === "min" ? 1 : -1;
+    const limit = settable < 0 ? stated : limits[settable], k = row.constraint;
+    if (row.reading >= 0) {
+      const value = readings[row.reading], size = Math.max(Math.abs(limit), Math.abs(value)) || 1;
+      return { limit, value, margin: (sign * (value - limit)) / size };
+    }
+    if (k < 0) return { limit, value: NaN, margin: 0 };
+    const bound = (side === "min" ? g_lower : g_upper)[k], size = Math.max(Math.abs(bound), Math.abs(g[k])) || 1;
+    return { limit, value: NaN, margin: (sign * (g[k] - bound)) / size };
+  }
+
+  /** Smallest relative margin of all limits, negative for a violated one; Infinity without limits. */
+  leastMargin() {
+    let least = Infinity;
+    for (const each of this.sides) {
+      const { margin } = this.measure(each);
+      if (!(margin >= least)) least = Number.isNaN(margin) ? -Infinity : margin;
+    }
+    return least;
+  }
+
   /** Limits with the value that is nearest to each, violated or not. @returns {LimitState[]} */
   limitStates() {
-    const { readings, limits, g, g_lower, g_upper } = this.module.arrays;
     /** @type {Map<string, LimitState>} */
-    const found = new Map();
-    for (const row of this.data.rows) {
-      for (const side of /** @type {const} */ (["min", "max"])) {
-        const stated = side === "min" ? row.low : row.high;
-        if (stated === null) continue;
-        const key = row.keys[side === "min" ? 0 : 1] || `${row.name}.${side}`;
-        const settable = this.limits.findIndex((each) => each.key === key);
-        const limit = settable < 0 ? stated : limits[settable];
-        const value = row.reading < 0 ? NaN : readings[row.reading];
-        const over = side === "min" ? limit - value : value - limit;
-        const bound = side === "min" ? g_lower : g_upper, k = row.constraint;
-        const excess = k < 0 ? 0 : side === "min" ? bound[k] - g[k] : g[k] - bound[k];
-        const isViolated = row.reading < 0 ? excess > ROUNDING * Math.abs(bound[k]) : over > ROUNDING * Math.max(Math.abs(limit), Math.abs(value));
-        const before = found.get(key);
-        if (before && !(over > (side === "min" ? before.limit - before.value : before.value - before.limit))) continue;
-        found.set(key, { key, name: row.name, side, limit, value, unit: row.unit, factor: row.factor, isViolated, settable });
-      }
+    const found = new Map(), margins = new Map();
+    for (const each of this.sides) {
+      const { key, row, side, settable } = each, { limit, value, margin } = this.measure(each);
+      if (found.has(key) && margin >= margins.get(key)) continue;
+      margins.set(key, margin);
+      found.set(key, { key, name: row.name, side, limit, value, unit: row.unit, factor: row.factor, isViolated: margin < -ROUNDING, settable });
     }
     return [...found.values()];
+  }
+
+  /** F at the point; 0 where it is rounding error of its terms, as in the terminal. */
+  shownF() {
+    const { F, view, p } = this.module.arrays, [first] = this.data.blocks.magnitude, { tasks, poses } = this.data;
+    if (this.fault & 3) return NaN;
+    const terms = tasks.map((/** @type {{ weight: number }} */ task, /** @type {number} */ k) => view[first + k] * (task.weight < 0 ? 1 : Math.abs(p[task.weight])));
+    const size = poses * terms.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0);
+    return Math.abs(F[0]) <= ZERO_F * size ? 0 : F[0];
   }
 
   /** Derivative of F by the shown value of a slider; NaN where it is not known. @param {Slider} slider */
@@ -441,6 +520,7 @@ export class State {
     if (this.kind === "optimum") {
       const changed = this.sliders.filter((each) => each.vector === "p" && this.module.arrays.p[each.index] !== data.p[each.index]).map((each) => each.name);
       if (this.hasOtherTask()) changed.push("the task");
+      if (this.statedWeights().some((each, k) => Math.abs(this.weights[k] - each) > 1e-12 * each)) changed.push("the weights");
       const parts = [held.length ? `${held.join(", ")} held` : "", changed.length ? `${changed.join(", ")} changed` : ""].filter(Boolean);
       const end = parts.length ? ` with ${parts.join(", ")}` : "";
       return { word: "local optimum", words: `found in this page${end}${data.notice ? ", limits only at the stated pose" : ""}; not proved`, isFault: false };
@@ -448,6 +528,7 @@ export class State {
     if (this.kind === "none") {
       return { word: "no optimum", words: data.statuses[this.status], isFault: true };
     }
+    if (this.remark) return { word: "point", words: this.remark, isFault: false };
     return { word: "point", words: "value at this point; computed in this page, nothing is optimised", isFault: false };
   }
 }

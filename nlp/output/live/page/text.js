@@ -38,12 +38,14 @@ export const settingsOf = (state) => {
 
 /** Names and values of the tasks, all or the changed ones. @param {State} state @param {boolean} all @returns {[string, string][]} */
 const taskSettings = (state, all) => {
-  const stated = state.statedTasks();
-  return state.tasks.flatMap((task, k) =>
+  const stated = state.statedTasks(), { weights } = state;
+  // Weights are relative, so one changed weight states all.
+  const weighed = weights.length && (all || state.statedWeights().some((each, k) => each !== weights[k])) ? weights.map((each, k) => /** @type {[string, string]} */ ([`task[${k}].weight`, String(each)])) : [];
+  return [...weighed, ...state.tasks.flatMap((task, k) =>
     /** @type {const} */ (["axis", "point", "pitch"])
       .filter((key) => state.data.stated_tasks[k][key] !== undefined && (all || String(task[key]) !== String(stated[k][key])))
       .map((key) => /** @type {[string, string]} */ ([`task[${k}].${key}`, key === "pitch" ? infinite(task.pitch) : task[key].join(",")])),
-  );
+  )];
 };
 /** @param {number} value */
 const infinite = (value) => (value === Infinity ? "inf" : String(value));
@@ -98,7 +100,12 @@ export const takeFragment = (state, fragment) => {
     if (shown !== null && state.setLimit(k, shown)) isFound = true;
   });
   for (const [name] of taskSettings(state, true)) {
-    const [, index, key] = /** @type {RegExpExecArray} */ (/^task\[(\d+)\]\.(axis|point|pitch)$/.exec(name));
+    const [, index, key] = /** @type {RegExpExecArray} */ (/^task\[(\d+)\]\.(axis|point|pitch|weight)$/.exec(name));
+    if (key === "weight") {
+      const weight = finite(parts.get(name));
+      if (weight !== null) isFound = state.setWeight(Number(index), weight) || isFound;
+      continue;
+    }
     const values = (parts.get(name) ?? "").split(",").filter(Boolean);
     const isWhole = values.length === (key === "pitch" ? 1 : 3);
     if (isWhole) values.forEach((text, k) => (isFound = state.setTask(Number(index), /** @type {any} */ (key), k, text === "inf" ? Infinity : Number(text)) || isFound));
