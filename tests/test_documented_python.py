@@ -100,3 +100,13 @@ def _steady(text: str) -> list[str]:
     """The lines of a text whose last digits do not differ between machines, numbers to four digits."""
     lines = [line for line in text.splitlines() if not line.startswith("evidence")]
     return [re.sub(r"\d+\.\d+", lambda found: f"{float(found[0]):.4g}", line) for line in lines]
+
+
+def test_lines_of_code_fit_into_the_column_of_the_site() -> None:
+    wide = []
+    for page in sorted(DOCS.glob("*.md")):
+        for block in re.findall(
+            r"^( *)```[^\n]*\n(.*?)^\1```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+        ):
+            wide += [f"{page.name}: {line}" for line in block[1].splitlines() if len(line) > 108]
+    assert wide == []

@@ -30,11 +30,11 @@ def test_introductions_and_examples_of_the_paper_have_a_live_page() -> None:
 def test_comments_become_links_to_the_pages_of_the_site() -> None:
     text = "before\n\n<!-- live: one, two-2.1 -->\n\nbetween\n\n<!-- live: three -->\n\n<!-- live: four -->\n"
     assert list(SCRIPT.names_in(text)) == ["one", "two-2.1", "three", "four"]
+    one, two = (f'<a href="live/{name}.html">{name}</a>' for name in ("one", "two-2.1"))
     linked = SCRIPT.with_links(text, {"one": "", "two-2.1": "no compiler", "three": "no C"})
     assert linked.split("\n\n") == [
         "before",
-        '<p class="live">Pages that solve: <a href="live/one.html">one</a>, '
-        '<a href="live/two-2.1.html">two-2.1</a> (without sliders)</p>',
+        f'<p class="live">Pages that solve: {one}, {two} (without sliders)</p>',
         "between",
         '<p class="live">Robot in three dimensions: <a href="live/three.html">three</a> (without sliders)</p>',
         "\n",
