@@ -76,8 +76,9 @@ site: $(VENV)/solving ## build the documentation as a site in build/site
 	@$(BIN)/python -c 'import furo, matplotlib, myst_nb, plotly' 2>/dev/null || $(BIN)/python -m pip install --quiet --editable '.[docs]'
 	$(BIN)/python -P -m sphinx --quiet --fail-on-warning --fresh-env --write-all docs build/site
 
-figures: $(VENV)/ready ## draw the pictures of the documentation
+figures: $(VENV)/ready ## draw the pictures of the documentation, that of a live page where Chromium is installed
 	$(BIN)/python -P docs/figures.py
+	$(BIN)/python -P docs/livepicture.py
 
 # Where not all methods that are compared can be installed, each is tried by itself: the rows of a missing one say so.
 PEERS := scipy nlopt cma pygmo pyscipopt maingopy
