@@ -93,6 +93,14 @@ def test_a_page_without_sliders_gives_its_reason(tmp_path: Path) -> None:
     assert "<canvas" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
+def test_the_picture_of_a_live_page_is_small() -> None:
+    picture = (DOCS / "figures" / "view.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) <= 80_000
+    for page in (DOCS.parent / "README.md", DOCS / "view.md"):
+        assert "figures/view.png)" in page.read_text(encoding="utf-8")
+
+
 @pytest.mark.skipif(importlib.util.find_spec("sphinx") is None, reason="sphinx is not installed")
 def test_the_configuration_writes_the_pages_and_their_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     conf = docs_script("conf")
