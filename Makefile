@@ -3,7 +3,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test quick soak check lint types more-types english house docs site figures bench dist clean
+.PHONY: help demo test quick soak check lint types more-types scripts english house docs site figures bench dist clean
 
 help: ## list these commands
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -39,7 +39,7 @@ build/typing/screwsynth: pyproject.toml
 	ln -sfn $(addprefix ../../../,__init__.py __init__.pyi py.typed models nlp cases) $@
 	touch $@
 
-check: lint types more-types english house ## check formatting, lint, types, import contracts and English; with --jobs 2 at once
+check: lint types more-types scripts english house ## check formatting, lint, types, import contracts and English; with --jobs 2 at once
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
@@ -51,6 +51,10 @@ types: $(VENV)/ready build/typing/screwsynth
 
 more-types: $(VENV)/ready build/typing/screwsynth
 	$(BIN)/basedpyright --level error
+
+# Types of the JavaScript in pages, where npm can install the compiler.
+scripts: $(VENV)/ready
+	$(BIN)/python -P bench/scripts.py
 
 # Descriptions that stand alone, short sentences in documents, words with a replacement.
 english: $(VENV)/ready
@@ -72,8 +76,9 @@ site: $(VENV)/solving ## build the documentation as a site in build/site
 	@$(BIN)/python -c 'import furo, matplotlib, myst_nb, plotly' 2>/dev/null || $(BIN)/python -m pip install --quiet --editable '.[docs]'
 	$(BIN)/python -P -m sphinx --quiet --fail-on-warning --fresh-env --write-all docs build/site
 
-figures: $(VENV)/ready ## draw the pictures of the documentation
+figures: $(VENV)/ready ## draw the pictures of the documentation, that of a live page where Chromium is installed
 	$(BIN)/python -P docs/figures.py
+	$(BIN)/python -P docs/livepicture.py
 
 # Where not all methods that are compared can be installed, each is tried by itself: the rows of a missing one say so.
 PEERS := scipy nlopt cma pygmo pyscipopt maingopy

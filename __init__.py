@@ -5,14 +5,15 @@ A platform of fixed dimensions drives a screw; its pose is free::
     from math import radians
     import screwsynth as ss
 
-    dimensions = {"x1": 12, "x2": 8, "x3": radians(30), "x4": radians(8)}  # radii in cm; angles are radians in Python
+    dimensions = {"x1": 12, "x2": 8, "x3": radians(30), "x4": radians(8)}  # cm; angles are radians in Python
     position = [ss.Free(-10, 10), ss.Free(-10, 10), ss.Free(20, 50)]  # cm, free between bounds
     rotation = ss.Rotation(axis=None, angle=ss.Free(-radians(30), radians(30)))
     task = ss.Task.screw("max", axis=[2, 2, 1], point=[2, 3, 6], pitch=1)  # point in cm, pitch in cm/rad
     limits, units = ss.Limits(leg_length=(None, 60)), ss.Units("cm", "deg")
     case = ss.Case(ss.stewart_gough(), dimensions, position, [task], rotation, limits=limits, units=units)
     solution = ss.solve(case)
-    print(f"F = {solution.F:.1f} (cm/rad)² at p_z = {solution['p_z']:.1f} cm, turned by {solution['angle']:.1f} deg")
+    p_z, angle = solution["p_z"], solution["angle"]
+    print(f"F = {solution.F:.1f} (cm/rad)² at p_z = {p_z:.1f} cm, turned by {angle:.1f} deg")
 
 ``solution["p_z"]`` and ``case.replace(x2=7)`` take numbers by the names of ``--set``, in the units of the case;
 arguments of types such as :class:`Free` and :class:`Rotation` are radians.

@@ -1,7 +1,9 @@
 """How Sphinx makes the site of these pages: run by ``make site``, which needs no network."""
 
 import re
+import sys
 from enum import Enum
+from pathlib import Path
 
 from docutils.nodes import SkipNode, math, math_block
 from docutils.utils.math import MathError
@@ -14,6 +16,10 @@ from sphinx.writers.html5 import HTML5Translator
 
 import screwsynth.models
 import screwsynth.nlp
+
+# Scripts beside this file; Sphinx does not add its folder.
+sys.path.append(str(Path(__file__).parent))
+import livepages
 
 project = "screwsynth"
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
@@ -43,13 +49,32 @@ python_use_unqualified_type_names = True
 maximum_signature_line_length = 100
 
 
+#: Reasons for missing sliders by the case of each live page of the site; empty texts for pages with sliders.
+_LIVE: dict[str, str] = {}
+
+
 def add_toctrees(_app: Sphinx, page: str, source: list[str]) -> None:
-    """Make the site's navigation of the headings and lists of links of the first page."""
-    if page == "index":
+    """Make the site's navigation of the headings and lists of links of the first page, and of the reference's."""
+    if page in {"index", "api"}:
         for group in source[0].split("\n## ")[1:]:
             pages = re.findall(r"^- \[.*?\]\((\w[\w-]*)\.\w+\)", group, flags=re.MULTILINE)
             tree = ["```{toctree}", ":hidden:", f":caption: {group.splitlines()[0]}", "", *pages, "```"]
             source[0] += "\n".join(["", *tree, ""])
+
+
+def write_live_pages(app: Sphinx) -> None:
+    """Write the live pages into the site, and say which of them have no sliders."""
+    if app.builder.format == "html":
+        _LIVE.update(livepages.write_pages(Path(app.outdir) / "live", livepages.live_names()))
+        for name, fault in _LIVE.items():
+            if fault:
+                # No warning: the site is complete without a compiler, and warnings end the build.
+                sys.stderr.write(f"live page without sliders: {name}: {fault}\n")
+
+
+def add_live_links(_app: Sphinx, _page: str, source: list[str]) -> None:
+    """Put links to live pages in place of the comments that name their cases."""
+    source[0] = livepages.with_links(source[0], _LIVE)
 
 
 def leaves_out(_app: Sphinx, kind: str, _name: str, member: object, _skip: bool, _options: object) -> bool | None:
@@ -80,7 +105,7 @@ def check_names(_app: Sphinx, env: BuildEnvironment) -> None:
     described = env.domains.python_domain.objects
     names = [f"{each.__name__}.{name}" for each in (screwsynth.nlp, screwsynth.models) for name in each.__all__]
     if missing := [name for name in names if name not in described]:
-        raise ExtensionError(f"public names that api.md does not describe: {', '.join(missing)}")
+        raise ExtensionError(f"public names that the pages api-*.md do not describe: {', '.join(missing)}")
 
 
 def write_formula(writer: HTML5Translator, node: math | math_block) -> None:
@@ -94,7 +119,9 @@ def write_formula(writer: HTML5Translator, node: math | math_block) -> None:
 
 def setup(app: Sphinx) -> None:
     """Connect the functions above."""
+    app.connect("builder-inited", write_live_pages)
     app.connect("source-read", add_toctrees)
+    app.connect("source-read", add_live_links)
     app.connect("autodoc-skip-member", leaves_out)
     app.connect("autodoc-process-signature", plain_defaults)
     app.connect("autodoc-process-docstring", keep_colons, priority=400)

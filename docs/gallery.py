@@ -14,6 +14,23 @@ PAGE = ROOT / "docs" / "robots.md"
 FOLDER = Path(screwsynth.models.__file__).parent / "robots"
 OPENING, CLOSING = "<!-- begin: gallery -->", "<!-- end -->"
 CASES = ROOT / "docs" / "cases.md"
+#: Cases with a live page on the site: those of introductions, and examples of the paper.
+LIVE = frozenset(
+    [
+        "agile-eye",
+        "hexapod-machining",
+        "machine-tool",
+        "motion-base",
+        "pick-and-place",
+        "paper-4.1-helical",
+        "paper-4.1-rotation",
+        "paper-4.2-rotation",
+        "paper-4.2-translation",
+        "paper-4.3",
+        "paper-4.4-max",
+        "paper-4.4-snu",
+    ]
+)
 CASES_HEAD = """# Cases
 
 These [cases](glossary.md#case) come with the package. Each command below finds its case by the name.
@@ -86,6 +103,8 @@ def cases() -> str:
             f"```sh\nscrewsynth {'workspace' if is_judged else 'solve'} {name}\n```\n",
             f"[The case file](../cases/{name}.toml)\n",
         ]
+        if name in LIVE:
+            parts.append(f"<!-- live: {name} -->\n")
         if (ROOT / "docs" / "figures" / f"{name}.png").exists():
             parts.append(f"![{tables['title']}](figures/{name}.png)\n")
     return "\n".join(parts)

@@ -16,6 +16,7 @@ import screwsynth.models
 import screwsynth.nlp
 from screwsynth.nlp.system.jsonvalues import JsonObject
 
+REFERENCE = "\n".join(page.read_text(encoding="utf-8") for page in sorted(DOCS.glob("api-*.md")))
 PUBLIC = [(package, name) for package in (screwsynth.nlp, screwsynth.models) for name in package.__all__]
 
 
@@ -24,7 +25,7 @@ def test_every_public_name_says_what_it_is_and_what_it_takes(package: ModuleType
     value = getattr(package, name)
     if not isinstance(value, type | FunctionType):
         # A name for a type has no docstring: the reference describes it.
-        assert f".. py:type:: {name}\n" in (DOCS / "api.md").read_text(encoding="utf-8")
+        assert f".. py:type:: {name}\n   :module: {package.__name__}\n" in REFERENCE
         return
     text = inspect.cleandoc(value.__doc__ or "")
     first = text.partition("\n\n")[0]
@@ -38,6 +39,23 @@ def test_every_public_name_says_what_it_is_and_what_it_takes(package: ModuleType
         described = "\n".join(lists)
         unsaid = [each for each in parts if not re.search(rf"^    \*{{0,2}}{each}: \S", described, flags=re.MULTILINE)]
         assert unsaid == []
+
+
+def test_the_reference_has_every_public_name_once_by_its_kind() -> None:
+    described = re.findall(r"^\.\. auto(\w+):: (\S+)$", REFERENCE, flags=re.MULTILINE)
+    described += [
+        ("type", f"{module}.{name}")
+        for name, module in re.findall(r"^\.\. py:type:: (\w+)\n   :module: (\S+)$", REFERENCE, flags=re.MULTILINE)
+    ]
+    names = [(_kind(getattr(package, name)), f"{package.__name__}.{name}") for package, name in PUBLIC]
+    assert sorted(described) == sorted(names)
+
+
+def _kind(value: object) -> str:
+    """The kind of a public name, as directives of autodoc call it."""
+    if isinstance(value, type):
+        return "exception" if issubclass(value, BaseException) else "class"
+    return "function" if isinstance(value, FunctionType) else "type"
 
 
 def _parts_of(value: type | FunctionType) -> list[str]:
@@ -82,3 +100,13 @@ def _steady(text: str) -> list[str]:
     """The lines of a text whose last digits do not differ between machines, numbers to four digits."""
     lines = [line for line in text.splitlines() if not line.startswith("evidence")]
     return [re.sub(r"\d+\.\d+", lambda found: f"{float(found[0]):.4g}", line) for line in lines]
+
+
+def test_lines_of_code_fit_into_the_column_of_the_site() -> None:
+    wide = []
+    for page in sorted(DOCS.glob("*.md")):
+        for block in re.findall(
+            r"^( *)```[^\n]*\n(.*?)^\1```", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+        ):
+            wide += [f"{page.name}: {line}" for line in block[1].splitlines() if len(line) > 108]
+    assert wide == []

@@ -1,19 +1,22 @@
 // Groups of links with the same limb, kind, and row of the Jacobian that gives the colour.
+/** @param {LinkData[]} links @returns {LinkData[][]} */
 const groupedLinks = (links) => {
+  /** @type {Map<string, LinkData[]>} */
   const found = new Map();
   for (const link of links) {
     if (link.limb === null || link.kind === "rail") continue;
     const key = JSON.stringify([link.limb, link.row, link.kind]);
-    if (!found.has(key)) found.set(key, []);
-    found.get(key).push(link);
+    found.set(key, [...(found.get(key) ?? []), link]);
   }
   return [...found.values()];
 };
 
 // Symbols of joints, as in picture files: shape by kind, dark if actuated, strokes for axes.
+/** @type {Record<JointData["kind"], [string, number]>} */
 const LOOKS = { R: ["circle", 5], P: ["square", 7], H: ["cross", 6], C: ["square", 7], U: ["diamond", 6], S: ["circle", 7], Pa: ["circle", 3] };
+/** @param {RobotData} view @param {Posture} frame @param {string} ink */
 const jointTraces = (view, frame, ink) => {
-  const dots = (name, places, marker, more = {}) => ({
+  const dots = (/** @type {string} */ name, /** @type {Vector[]} */ places, /** @type {Style} */ marker, /** @type {Style} */ more = {}) => ({
     type: "scatter3d", mode: "markers", name, x: places.map((p) => p[0]), y: places.map((p) => p[1]), z: places.map((p) => p[2]),
     marker, hoverinfo: "skip", showlegend: false, ...more,
   });
@@ -21,7 +24,10 @@ const jointTraces = (view, frame, ink) => {
     const ends = [...new Set(view.links.filter((link) => link.limb !== null).flatMap((link) => link.ends))];
     return [dots("joints", ends.map((each) => frame.points[each]), { size: 5, color: "#fff", line: { color: ink, width: 2 } })];
   }
-  const found = [], ends = [[], [], []];
+  /** @type {Style[]} */
+  const found = [];
+  /** @type {(number | null)[][]} */
+  const ends = [[], [], []];
   view.joints.forEach(({ kind }, k) => {
     if (kind === "P" || kind === "Pa") return;
     const [place, ...axes] = frame.joints[k];
@@ -32,7 +38,7 @@ const jointTraces = (view, frame, ink) => {
   });
   found.push({ type: "scatter3d", mode: "lines", name: "joint axes", x: ends[0], y: ends[1], z: ends[2], line: { color: ink, width: 3 }, hoverinfo: "skip", showlegend: false });
   for (const kind of new Set(view.joints.map((each) => each.kind))) {
-    const own = view.joints.map((each, k) => [each, frame.joints[k][0]]).filter(([each]) => each.kind === kind), [symbol, size] = LOOKS[kind];
+    const own = view.joints.map((each, k) => /** @type {const} */ ([each, frame.joints[k][0]])).filter(([each]) => each.kind === kind), [symbol, size] = LOOKS[kind];
     found.push(dots(`joints ${kind}`, own.map(([, place]) => place), { symbol, size, color: own.map(([each]) => (each.actuated ? ink : "#fff")), line: { color: ink, width: 2 } }, {
       hoverinfo: "text", hovertext: own.map(([each]) => plain(each.words)),
     }));
@@ -43,6 +49,7 @@ const jointTraces = (view, frame, ink) => {
 
 
 // Arrows of the load and of the actuators' forces, as in picture files: a pull begins with a dot, a moment has two heads.
+/** @param {View} view @param {string} ink @returns {Style[]} */
 const forceTraces = (view, ink) => view.forces.flatMap(({ kind, name, words, colour, ends: [start, end] }) => {
   const way = plus(end, start, -1), long = norm(way);
   if (!(long > 0)) return [];

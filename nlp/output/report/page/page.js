@@ -1,5 +1,6 @@
 (() => {
-  const data = JSON.parse(byId("data").textContent);
+  /** @type {ReportData} */
+  const data = JSON.parse(byId("data").textContent ?? "");
   // The rates of a free motion are rounding errors, and shown as 0.
   for (const frame of data.views.flatMap((each) => each.frames)) {
     frame.rates = frame.rates.map((rate) => (Math.abs(rate) > frame.noise ? rate : 0));
@@ -8,8 +9,10 @@
   document.documentElement.classList.add("scripted");
   const VELOCITY = "#6d2a8c", FREE = "#0b6b57";
 
-  let view = data.views[0] || null;
+  // A page without a view has none of the elements that call functions with a view.
+  let view = data.views[0];
   let index = view ? view.zero : 0;
+  /** @type {Layout | null} */
   let layout = null;
   // Until the platform is moved, the box encloses only the posture of the design.
   let isMoved = false;
@@ -17,6 +20,7 @@
   // Colours and bars have the scale of the shown pose, as in picture files.
   const largest = () => Math.max(...view.frames[index].rates.map(Math.abs)) || 1;
 
+  /** @param {number} rate */
   function colour(rate) {
     const colours = view.colours, last = colours.length - 1;
     const place = Math.min(Math.max((rate / largest() + 1) / 2, 0), 1) * last;
@@ -28,8 +32,9 @@
     return `rgb(${mixed.join(",")})`;
   }
 
+  /** @param {Frame} frame @param {string | null} limb */
   function limbText(frame, limb) {
-    const rows = view.rows.map((row, k) => [row, k]).filter(([row]) => row.limb === limb);
+    const rows = view.rows.map((row, k) => /** @type {const} */ ([row, k])).filter(([row]) => row.limb === limb);
     const text = [`<b>limb ${plain(limb)}</b>`];
     const length = rows.length ? frame.lengths[rows[0][1]] : null;
     if (length !== null) text.push(`${view.measure.words} ${shown(length, 5)} ${plain(view.measure.units[rows[0][1]])}`);
@@ -42,17 +47,21 @@
     return text.join("<br>");
   }
 
+  /** @param {Frame} frame */
   function traces(frame) {
-    const found = [], size = view.size, points = frame.points;
-    if (view.reference) {
-      found.push(lines("start", view.links.map((link) => link.ends.map((end) => view.reference[end])), { color: "#8b959e", width: 2, dash: "dot" }));
+    /** @type {Style[]} */
+    const found = [];
+    const size = view.size, points = frame.points;
+    const { reference, motion } = view;
+    if (reference) {
+      found.push(lines("start", view.links.map((link) => link.ends.map((end) => reference[end])), { color: "#8b959e", width: 2, dash: "dot" }));
     }
     found.push(...bodyTraces(view, points));
-    if (view.motion) {
-      found.push(lines("axis", [view.motion.line], { color: INK, width: 9 }));
-      const along = plus(view.motion.line[1], view.motion.line[0], -1), unit = along.map((each) => each / norm(along));
-      found.push(heads("axis head", [plus(view.motion.line[1], unit, 0.06 * size)], [unit], 0.11 * size, INK));
-      const path = view.motion.path;
+    if (motion) {
+      found.push(lines("axis", [motion.line], { color: INK, width: 9 }));
+      const along = plus(motion.line[1], motion.line[0], -1), unit = along.map((each) => each / norm(along));
+      found.push(heads("axis head", [plus(motion.line[1], unit, 0.06 * size)], [unit], 0.11 * size, INK));
+      const path = motion.path;
       if (path.length > 2) {
         found.push(lines("path", [path], { color: VELOCITY, width: 5 }));
         const last = path[path.length - 1], step = plus(last, path[path.length - 2], -1);
@@ -72,7 +81,8 @@
     found.push(...jointTraces(view, frame, INK));
     const factor = speedScale();
     if (factor > 0) {
-      const starts = [], tips = [], ways = [];
+      /** @type {Vector[][]} */
+      const [starts, tips, ways] = [[], [], []];
       frame.velocities.forEach((velocity, k) => {
         const speed = norm(velocity);
         if (speed * factor < 1e-6 * size) return;
@@ -108,6 +118,7 @@
     return fastest > 1e-9 * view.size ? (0.42 * view.size) / fastest : 0;
   }
 
+  /** @returns {[number, number][]} */
   function ranges() {
     const shownFrames = isMoved ? view.frames : [view.frames[view.zero]], every = shownFrames.flatMap((frame) => frame.points);
     // Plotly does not draw outside of the box, so it must enclose the arrows too.
@@ -144,8 +155,8 @@
   function keep() {
     clearTimeout(later);
     later = setTimeout(async () => {
-      const box = byId("view");
-      byId("view-copy").src = await window.Plotly.toImage(box, { format: "png", width: 1000, height: 560 });
+      if (!window.Plotly) return;
+      byId("view-copy").src = await window.Plotly.toImage(byId("view"), { format: "png", width: 1000, height: 560 });
       document.documentElement.dataset.copied = "yes";
     }, 700);
   }
@@ -161,11 +172,12 @@
     byId("where").textContent = frame.words;
     byId("F-there").textContent = `${shown(frame.F, 7)} ${view.objective_unit}`.trim();
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
-      const rate = frame.rates[k];
-      row.querySelector(".length").textContent = frame.lengths[k] === null ? "" : shown(frame.lengths[k], 5);
-      row.querySelector(".rate").textContent = shown(rate, 6, true);
-      row.querySelector(".share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
-      const bar = row.querySelector(".bar");
+      const rate = frame.rates[k], length = frame.lengths[k];
+      const cell = (/** @type {string} */ name) => /** @type {HTMLElement} */ (row.querySelector(`.${name}`));
+      cell("length").textContent = length === null ? "" : shown(length, 5);
+      cell("rate").textContent = shown(rate, 6, true);
+      cell("share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
+      const bar = cell("bar");
       bar.classList.toggle("minus", rate < 0);
       bar.style.setProperty("--part", (Math.abs(rate) / largest()).toFixed(4));
     });
@@ -190,16 +202,17 @@
     }
     view = found;
     if (byId("travel")) {
-      byId("travel").max = view.frames.length - 1;
-      byId("travel").value = view.zero;
+      byId("travel").max = String(view.frames.length - 1);
+      byId("travel").value = String(view.zero);
     }
-    document.querySelectorAll("img.still").forEach((each) => each.classList.toggle("chosen", Number(each.dataset.view) === data.views.indexOf(view)));
+    /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("img.still")).forEach((each) => each.classList.toggle("chosen", Number(each.dataset.view) === data.views.indexOf(view)));
     if (byId("pose")) tellPose();
     if (window.Plotly && layout) layout = newLayout();
     move(view.zero);
   }
 
   let waiting = false;
+  /** @param {number} to */
   function move(to) {
     index = to;
     tell();
@@ -208,7 +221,9 @@
     requestAnimationFrame(() => { waiting = false; draw(); });
   }
 
+  /** @param {string | undefined} key */
   function turn(key) {
+    if (!window.Plotly || !layout) return;
     layout.scene.camera = key === "reset" ? camera() : turnedCamera(layout.scene.camera, key);
     keep();
     window.Plotly.relayout(byId("view"), { "scene.camera": layout.scene.camera });
@@ -216,14 +231,14 @@
 
   function map() {
     const [part, which] = byId("pair").value.split(" ").map(Number), plane = data.planes[part][which];
-    const label = (k) => plane.names[k] + (plane.units[k] ? `, ${plane.units[k]}` : "");
+    const label = (/** @type {number} */ k) => plane.names[k] + (plane.units[k] ? `, ${plane.units[k]}` : "");
     byId("map-words").textContent = plane.words;
     byId("map").setAttribute("aria-label", plane.words);
     if (!window.Plotly) return;
     const hover = `${plain(label(0))}: %{x:.5g}<br>${plain(label(1))}: %{y:.5g}<br>F: %{z:.5g}<extra></extra>`;
     const kept = plane.F.map((row, r) => row.map((value, k) => (plane.inside[r][k] === "1" ? value : null)));
     const values = plane.F.flat().filter((value) => value !== null);
-    const contour = (z, more) => ({ type: "contour", x: plane.first, y: plane.second, z, zmin: Math.min(...values), zmax: Math.max(...values), colorscale: "Viridis", connectgaps: false, line: { width: 0.6, color: "rgba(255,255,255,0.6)" }, hovertemplate: hover, ...more });
+    const contour = (/** @type {(number | null)[][]} */ z, /** @type {Style} */ more) => ({ type: "contour", x: plane.first, y: plane.second, z, zmin: Math.min(...values), zmax: Math.max(...values), colorscale: "Viridis", connectgaps: false, line: { width: 0.6, color: "rgba(255,255,255,0.6)" }, hovertemplate: hover, ...more });
     const all = kept.flat().every((value, k) => value === plane.F.flat()[k]);
     window.Plotly.react(byId("map"), [
       ...(all ? [] : [contour(plane.F, { opacity: 0.35, showscale: false })]),
@@ -237,13 +252,13 @@
   }
 
   async function copy() {
-    const text = byId("case-text").textContent;
+    const text = byId("case-text").textContent ?? "";
     let done = true;
     try {
       await navigator.clipboard.writeText(text);
     } catch {
       // Without permission for the clipboard, try the older command for the selection.
-      getSelection().selectAllChildren(byId("case-text"));
+      getSelection()?.selectAllChildren(byId("case-text"));
       done = document.execCommand("copy");
     }
     byId("copied").textContent = done ? "Copied." : "Not copied: the text is selected, copy it with the keyboard.";
@@ -251,18 +266,18 @@
 
   byId("copy").addEventListener("click", copy);
   if (view) {
-    if (byId("travel")) byId("travel").addEventListener("input", (event) => {
+    if (byId("travel")) byId("travel").addEventListener("input", () => {
       if (!isMoved && layout) {
         isMoved = true;
         layout = newLayout();
       }
-      move(Number(event.target.value));
+      move(Number(byId("travel").value));
     });
-    document.querySelectorAll("[data-turn]").forEach((button) => button.addEventListener("click", () => layout && turn(button.dataset.turn)));
+    /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-turn]")).forEach((button) => button.addEventListener("click", () => turn(button.dataset.turn)));
     tell();
     if (byId("task")) byId("task").addEventListener("change", choose);
     if (byId("pose")) byId("pose").addEventListener("input", choose);
-    if (byId("worst")) byId("worst").addEventListener("click", () => { byId("pose").value = worst(); choose(); });
+    if (byId("worst")) byId("worst").addEventListener("click", () => { byId("pose").value = String(worst()); choose(); });
     if (byId("pose")) tellPose();
   }
   if (byId("pair")) {

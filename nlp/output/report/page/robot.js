@@ -4,7 +4,9 @@ const FONT = "Arial, 'DejaVu Sans', sans-serif";
 const CONFIG = { displaylogo: false, displayModeBar: false, responsive: true, scrollZoom: false };
 
 // Polylines from lists of points, separated by gaps.
+/** @param {string} name @param {Vector[][]} parts @param {Style} style @param {Style} [more] @returns {Style} */
 const lines = (name, parts, style, more = {}) => {
+  /** @type {(number | null)[][]} */
   const axes = [[], [], []];
   for (const part of parts) {
     for (const point of part) point.forEach((value, k) => axes[k].push(value));
@@ -14,9 +16,13 @@ const lines = (name, parts, style, more = {}) => {
 };
 
 // Faces of base and platform, rails, and edges that belong to no limb.
+/** @param {RobotData} view @param {Vector[]} points */
 const bodyTraces = (view, points) => {
+  /** @type {Style[]} */
   const found = [];
-  for (const [body, loop] of Object.entries(view.plates)) {
+  for (const body of /** @type {const} */ (["base", "platform"])) {
+    const loop = view.plates[body];
+    if (!loop) continue;
     const corners = loop.map((each) => points[each]);
     const middle = [0, 1, 2].map((k) => corners.reduce((sum, each) => sum + each[k], 0) / corners.length);
     const all = [...corners, middle], count = corners.length;
@@ -34,14 +40,16 @@ const bodyTraces = (view, points) => {
 };
 
 // Name of each limb on its longest link.
+/** @param {RobotData} view @param {Vector[]} points @param {boolean} isNarrow */
 const limbNames = (view, points, isNarrow) => {
+  /** @type {Map<string, { size: number, start: Vector, way: Vector }>} */
   const found = new Map();
   for (const { limb, kind, ends: [a, b] } of view.links) {
     if (limb === null || kind === "rail") continue;
     const way = plus(points[b], points[a], -1), long = norm(way);
     // Rods of several limbs meet at the platform: prefer a bar for the name.
     const size = long + (kind === "bar" ? 100 * view.size : 0);
-    if (!found.has(limb) || found.get(limb).size < size) found.set(limb, { size, start: points[a], way });
+    if (!((found.get(limb)?.size ?? -1) >= size)) found.set(limb, { size, start: points[a], way });
   }
   // Different heights, so that names of neighbouring limbs do not overlap.
   return [...found].map(([limb, { start, way }], k) => {
@@ -50,9 +58,10 @@ const limbNames = (view, points, isNarrow) => {
   });
 };
 
+/** @param {[number, number][]} ranges @param {string} length @param {Camera} camera @returns {Layout} */
 const sceneLayout = (ranges, length, camera) => {
   const unit = length ? `, ${plain(length)}` : "";
-  const axis = (name, range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6, ticklen: 3, tickfont: { size: 11 } });
+  const axis = (/** @type {string} */ name, /** @type {[number, number]} */ range) => ({ title: { text: name + unit }, range, autorange: false, backgroundcolor: "#f7f9fa", gridcolor: "#dde3e8", zerolinecolor: "#b9c1c9", showbackground: true, showspikes: false, nticks: 6, ticklen: 3, tickfont: { size: 11 } });
   const [x, y, z] = ranges;
   return {
     margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "#fff", font: { family: FONT, color: INK, size: 12 }, hovermode: "closest",
@@ -60,8 +69,9 @@ const sceneLayout = (ranges, length, camera) => {
   };
 };
 
+/** @param {Camera} from @param {string | undefined} key @returns {Camera} */
 const turnedCamera = (from, key) => {
-  const { eye, center } = from, [x, y, z] = ["x", "y", "z"].map((each) => eye[each] - center[each]), far = Math.hypot(x, y, z);
+  const { eye, center } = from, x = eye.x - center.x, y = eye.y - center.y, z = eye.z - center.z, far = Math.hypot(x, y, z);
   let round = Math.atan2(y, x), up = Math.asin(z / far), distance = far;
   if (key === "left") round -= Math.PI / 12;
   if (key === "right") round += Math.PI / 12;
@@ -73,10 +83,11 @@ const turnedCamera = (from, key) => {
 };
 
 // Plotly takes half a second: it starts after text and tables are painted. Without it or WebGL, the drawing is fixed.
+/** @param {() => Promise<void>} draw @param {() => void} giveUp @param {() => void} [end] */
 const afterPaint = (draw, giveUp, end = () => {}) => requestAnimationFrame(() => setTimeout(async () => {
   try {
     const library = document.createElement("script");
-    library.textContent = await unpacked(byId("plotly").textContent);
+    library.textContent = await unpacked(byId("plotly").textContent ?? "");
     document.head.append(library);
     await draw();
   } catch {
