@@ -210,7 +210,7 @@ def design_table(
     headers = ("", "reached" if reached else "value", "unit", "bounds", "status", slope)
     columns = len(headers) if any(row.cells[4] for row in rows) else 4
     cells = tuple(row.cells[:columns] for row in rows)
-    return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named)
+    return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named, with_unit=(1,))
 
 
 def stated_poses_of(robot: RobotData) -> tuple[PlatformPose, ...]:

@@ -93,7 +93,7 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") ->
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
     headers = ("limit", "allowed", "unit", "nearest value", "margin", "status", "change of F", "where")
-    return TextTable(headers, tuple(rows), "limits", title)
+    return TextTable(headers, tuple(rows), "limits", title, with_unit=(1, 3, 4))
 
 
 def _text(value: float, size: float) -> str:
@@ -148,7 +148,8 @@ def margin_table(margins: Sequence[Margin]) -> TextTable:
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         cells = (row.name, row.bound, value, limit, _margin_text(row.margin, beside, word), row.unit, word)
         rows.append(cells)
-    return TextTable(("quantity", "bound", "value", "limit", "margin", "unit", "status"), tuple(rows), "margins")
+    headers = ("quantity", "bound", "value", "limit", "margin", "unit", "status")
+    return TextTable(headers, tuple(rows), "margins", with_unit=(2, 3, 4))
 
 
 def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: bool) -> TextTable:
@@ -176,7 +177,7 @@ def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: boo
             f"F better by {slope} {per_words(side.unit)} relaxed",
         )
         rows.append(cells if is_answer else cells[:-1])
-    return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
+    return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active", with_unit=(2,))
 
 
 def _violated(result: SolveResult | CombinedData) -> Collection[str]:

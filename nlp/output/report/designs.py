@@ -18,7 +18,6 @@ from .markup import (
     Markup,
     answer_box,
     contents_and_body,
-    html_table,
     image_source,
     join_markup,
     paragraphs,
@@ -26,6 +25,7 @@ from .markup import (
     tag,
     whole_page,
 )
+from .tables import html_table
 
 #: Largest number of drawn designs, and of table rows on a page: a browser is slow with many more.
 _MOST, _ROWS = 12, 500

@@ -24,13 +24,13 @@ from .markup import (
     Markup,
     answer_box,
     contents_and_body,
-    html_table,
     image_source,
     join_markup,
     paragraphs,
     tag,
     whole_page,
 )
+from .tables import html_table
 from .verdicts import origin, refuting_place, shown_command, shown_verdicts
 
 
