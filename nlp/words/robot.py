@@ -16,6 +16,8 @@ from ..case.pose import Free, RotationForm, Value, sizes_of_turn
 from ..case.task import Method, Sense
 from ..results.poses import rotation_numbers
 from ..results.rounding import (
+    FLAT,
+    NOISE,
     STATED,
     TURNED,
     ordered,
@@ -122,7 +124,9 @@ class _Rows:
         label = self._units.label(dimension)
         if isinstance(given, Free):
             lower, upper = (self._units.shown(end, dimension) for end in (given.lower, given.upper))
-            shown, between = number(value, upper - lower), free_words(given, self._units, dimension)
+            # A bound holds a value exactly.
+            part = NOISE if name in self._active else FLAT
+            shown, between = number(value, upper - lower, part=part), free_words(given, self._units, dimension)
         else:
             lower, upper = value, value
             shown, between = number(value, beside, part=STATED), ""

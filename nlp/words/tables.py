@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
 from ..results.data import CombinedData
-from ..results.rounding import NOISE, rate_sizes, settled, settled_F, task_F
+from ..results.rounding import FLAT, NOISE, rate_sizes, settled, settled_F, task_F
 from ..units import Units
 from .joints import motion_words
 from .lines import SET, counted
@@ -207,7 +207,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
     for found in solution.optima[:MOST_OPTIMA]:
         spread = f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
         at = [
-            number(units.shown(float(value), variable.dimension), width, digits=6)
+            number(units.shown(float(value), variable.dimension), width, digits=6, part=FLAT)
             for value, variable, width in zip(found.x, variables, widths, strict=True)
         ]
         F = number(task_F(robot, found.F))

@@ -25,7 +25,7 @@ class Markup(str):
 
 
 #: Elements without an end tag.
-_VOID = frozenset(["meta", "link", "input", "br", "img"])
+_VOID = frozenset(["meta", "link", "input", "br", "img", "source"])
 #: Elements whose text is copied into a shell or a file, character by character.
 _EXACT = frozenset(["code", "title"])
 #: Attributes that are read to people.
@@ -199,15 +199,21 @@ def contents_and_body(sections: Iterable[tuple[str, str, Markup]]) -> tuple[Mark
     return contents, body
 
 
-def picture_figure(svg: bytes, words: str) -> Markup:
+def picture_figure(svg: bytes, narrow: bytes, words: str) -> Markup:
     """Return a picture as a figure of a page.
 
     Args:
         svg: content of the SVG file.
+        narrow: content of the SVG file for a narrow window.
         words: caption and text alternative of the picture.
     """
-    image = tag("img", src=image_source(svg), alt=words)
-    return tag("figure", image, tag("figcaption", words))
+    return tag("figure", picture_element(svg, narrow, alt=words), tag("figcaption", words))
+
+
+def picture_element(svg: bytes, narrow: bytes, **attributes: object) -> Markup:
+    """Return an SVG picture with another one for narrow windows; the attributes are those of the image."""
+    source = tag("source", media="(max-width: 34rem)", srcset=image_source(narrow))
+    return tag("picture", source, tag("img", src=image_source(svg), **attributes))
 
 
 def image_source(content: bytes, kind: str = "svg+xml") -> str:

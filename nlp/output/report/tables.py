@@ -64,7 +64,8 @@ def _table_element(content: _Content, caption: str, **attributes: object) -> Mar
     for place, row in enumerate(rows):
         first, *others = (column[place] for column in aligned)
         cells = [_cell(text, content, is_long=is_long) for text, content in zip(row[1:], others, strict=True)]
-        body.append(tag("tr", tag("th", first, scope="row"), *cells))
+        kind = "long" if len(row[0]) > _LONG else None
+        body.append(tag("tr", tag("th", first, scope="row", class_=kind), *cells))
     kind = "long" if is_long else None
     whole = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body), class_=kind, **attributes)
     box = "scroll tall" if len(rows) >= _TALL else "scroll"
@@ -87,7 +88,7 @@ def _content(table: TextTable) -> _Content:
     if len(rows) >= _ONE_LINE:
         texts = [{row[k] for row in rows} for k in range(len(headers))]
         equal = [k for k in range(1, len(headers)) if len(texts[k]) == 1 and headers[k]]
-        words = [f"{headers[k]} {rows[0][k]}" for k in equal if rows[0][k]]
+        words = [_equal_words(headers[k], rows[0][k]) for k in equal if rows[0][k]]
         above += [f"In all rows: {', '.join(words)}."] if words else []
         headers, rows = _without(headers, rows, set(equal))
     return _Content(headers, rows, above)
@@ -100,6 +101,12 @@ def _without(headers: list[str], rows: list[list[str]], places: set[int]) -> tup
         return [cell for k, cell in enumerate(cells) if k not in places]
 
     return kept(headers), [kept(row) for row in rows]
+
+
+def _equal_words(header: str, text: str) -> str:
+    """Return the common text of a column, such as ``x2 = 12.5 in`` for the header ``x2, in``."""
+    name, _, unit = header.partition(", ")
+    return f"{name} = {text} {unit}".rstrip() if is_number(text) else f"{header}: {text}"
 
 
 def is_number(text: str) -> bool:
@@ -127,4 +134,5 @@ def _cell(text: str, content: object, *, is_long: bool) -> Markup:
     """Return a cell of a table, with a class for a short number; a long text of a long table is cut to one line."""
     if is_long and len(text) > _LONG:
         return tag("td", tag("details", tag("summary", content), class_="cell"))
-    return tag("td", content, class_="number" if len(text) < _SHORT and is_number(text) else None)
+    kind = "long" if len(text) > _LONG else "number" if len(text) < _SHORT and is_number(text) else None
+    return tag("td", content, class_=kind)
