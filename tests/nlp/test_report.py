@@ -118,11 +118,13 @@ def test_tables_are_the_json_result(page: Callable[..., Page], case: str) -> Non
     labels |= {plane["label"] for planes in found.data["planes"] for plane in planes}
     assert labels == {f"F, ({result['units']['length']}/rad)²"}
     (sides,) = [rows for rows in found.tables.values() if rows[0][-1:] == ["multiplier"]]
-    *_, value, state, multiplier = sides[1]
-    unit = value.partition(" ")[2]
+    side = dict(zip(*sides[:2], strict=True))
+    unit = side["value"].partition(" ")[2]
     assert unit
-    assert state == "active"
-    assert re.fullmatch(rf"F better by \S+ per {re.escape(unit)} relaxed", multiplier)
+    # A status of all rows is said once above the table.
+    assert side.get("status", "active") == "active"
+    assert "status" in side or "In all rows: status: active" in found.words
+    assert re.fullmatch(rf"F better by \S+ per {re.escape(unit)} relaxed", side["multiplier"])
 
 
 def test_rounding_is_no_rate_and_published_numbers_stand_beside_computed_ones(page: Callable[..., Page]) -> None:
