@@ -376,7 +376,8 @@ shown.forEach((one, k) => shown.slice(k + 1).forEach((other) => {
   const isInside = one.contains(other) || other.contains(one);
   // Drawings of designs have no text.
   const isDesign = one.closest(".designs") && other.closest(".designs");
-  if (!isInside && !isDesign && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2) beside.push(one.outerHTML.slice(0, 60));
+  const overlap = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+  if (!isInside && !isDesign && overlap > 2) beside.push(one.outerHTML.slice(0, 60));
 }));
 return [shown.length, beside, innerWidth, document.documentElement.scrollWidth];"""
 
