@@ -270,7 +270,7 @@ def _details(robot: ComparedRobotData) -> DesignDetails:
         )
         for each in robot.dimensions
     )
-    table = TextTable(("dimension", "value", "unit", "range"), rows) if rows else None
+    table = TextTable(("dimension", "value", "unit", "range"), rows, with_unit=(1,)) if rows else None
     return DesignDetails(robot.name, (f"{robot.description}.", *robot.sentences), table)
 
 

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from types import MappingProxyType
 
+from ..case.task import Sense
 from ..evidence.optimality import Evidence
 from ..program.places import Scalar
 from ..program.program import design_indices, design_names
@@ -113,12 +114,12 @@ def front_designs(front: Front, result: FrontResult) -> Designs[int]:
 def _lines(front: Front, result: FrontResult) -> list[str]:
     """Return a summary of a front."""
     count, goals = len(result.points), [_words(goal) for goal in front.goals]
-    lines = [f"{count} point{'s' * (count > 1)} on the front of {', '.join(goals[:-1])} and {goals[-1]}"]
+    lines = [f"Pareto front of {count} point{'s' * (count > 1)}: {', '.join(goals[:-1])} and {goals[-1]}"]
     for goal in front.goals:
         values = [point.goals[goal.label] for point in result.points]
         # The ends of a front of two goals have the extreme values.
         low, high = (values[0], values[-1]) if len(goals) == 2 else (min(values), max(values))
-        lines.append(f"{goal.label}: {low:.7g} to {high:.7g}")
+        lines.append(f"{_quantity(goal)}: {low:.7g} to {high:.7g}")
     lines += [] if result.notice is None else [result.notice]
     if front.gaps:
         lines.append(f"gaps of the front, without points between two neighbours: {len(front.gaps)}")
@@ -160,7 +161,11 @@ def _columns(front: Front, result: FrontResult) -> Iterator[Column[int]]:
 
     yield from map(of_goal, goals, goal_units(front))
     yield Column(
-        "optimised", lambda k: rows[k].optimised, holds=str, label="optimum of", text=lambda k: rows[k].optimised
+        "optimised",
+        lambda k: rows[k].optimised,
+        holds=str,
+        label="optimum of",
+        text=lambda k: _quantity(goals[points[k].program.optimised]),
     )
     if len(goals) == 2:  # one alone has a bound
         yield Column("bound", lambda k: next(iter(rows[k].bounds.values()), None))
@@ -198,8 +203,8 @@ def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
     names = design_names(solution.nlp.program)
     sides = () if solution.evidence is None else solution.evidence.active
     return DrawnDesign(
-        ", ".join(f"{goal.label} = {value:.6g}{unit}" for goal, value, unit in pairs),
-        f"optimum of {front.goals[point.program.optimised].label}",
+        ", ".join(f"{_quantity(goal)} = {value:.6g}{unit}" for goal, value, unit in pairs),
+        f"optimum of {_quantity(front.goals[point.program.optimised])}",
         design_values(solution.nlp, solution.x),
         tuple(f"{side.name} {side.bound}" for side in sides if side.name in names),
         solution.nlp,
@@ -223,7 +228,13 @@ def _counted(point: FrontPoint) -> list[str]:
 
 
 def _words(goal: Goal) -> str:
-    return f"{goal.sense.value} {goal.label}"
+    """Return a goal in words, such as ``smallest leg_length.max``."""
+    return f"{'largest' if goal.sense is Sense.MAX else 'smallest'} {_quantity(goal)}"
+
+
+def _quantity(goal: Goal) -> str:
+    """Return the quantity of a goal in words, such as ``F of drive`` for ``F:drive``."""
+    return goal.label.removeprefix("limits.") if goal.task is None else goal.label.replace("F:", "F of ", 1)
 
 
 def _point(front: Front, point: FrontPoint) -> FrontPointData:

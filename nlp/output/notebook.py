@@ -33,7 +33,8 @@ from ..words.text import Line, TextTable
 from .pictures.drawing import Drawing, drawing_of, drawing_of_model
 from .pictures.requirements import check_library
 from .pictures.solutions import drawings_of
-from .report.markup import html_table, image_source, join_markup, paragraphs, tag
+from .report.markup import image_source, join_markup, paragraphs, tag
+from .report.tables import html_table
 from .terminal import show
 
 #: Width of a text in columns, as the command line writes it into a file.

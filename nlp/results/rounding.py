@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 #: Error bound of a number, as a fraction of its terms, its neighbours or its range: a thousand times a search's error.
 NOISE = 1e-9
+#: Error bound of a variable of an optimum, as a fraction of its range: where F is flat, a search ends within the square
+#: root of the rounding error, 1.5e-8 of the range, and a few times this where the flat direction has several variables.
+FLAT = 1e-7
 #: Error bound of a stated number, as a fraction of the largest stated with it: a few times the rounding of a sine.
 STATED = 1e-14
 #: Significant digits by which numbers are sorted, so that rounding errors do not decide on the order.

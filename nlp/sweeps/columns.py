@@ -20,6 +20,7 @@ from ..results.design import limits_data, margins_data
 from ..results.explorations import Numbers, SweepResult
 from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
+from ..results.rounding import FLAT
 from ..results.tradeoff import unit_of_number
 from ..system.journal import fields_of
 from ..system.jsonvalues import finite_or_none, vector
@@ -208,7 +209,7 @@ def _variable(k: int, name: str, size: float, unit: str) -> Column[Row]:
         ColumnKind.VARIABLE,
         label=name,
         unit=unit,
-        text=lambda row: number(row.x[k], size) if k < len(row.x) else "",
+        text=lambda row: number(row.x[k], size, part=FLAT) if k < len(row.x) else "",
     )
 
 

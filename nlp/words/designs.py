@@ -13,6 +13,7 @@ from ..evidence.state import RobotState
 from ..program.nlp import Nlp
 from ..program.program import design_indices
 from ..results.data import CertificateData
+from ..results.rounding import FLAT
 from ..system.csvtext import csv_text
 from .numbers import number
 from .text import Line, TextTable
@@ -229,6 +230,7 @@ def design_values(nlp: Nlp, x: FloatArray) -> tuple[str, ...]:
     units, variables = nlp.case.units, nlp.program.variables
     found = []
     for k in design_indices(nlp.program):
-        shown = number(units.shown(float(x[k]), variables[k].dimension), digits=5)
+        width = units.shown(float(nlp.scale[k]), variables[k].dimension)
+        shown = number(units.shown(float(x[k]), variables[k].dimension), width, digits=5, part=FLAT)
         found.append(f"{variables[k].name} = {shown} {units.label(variables[k].dimension)}".rstrip())
     return tuple(found)

@@ -16,6 +16,8 @@ from ..case.pose import Free, RotationForm, Value, sizes_of_turn
 from ..case.task import Method, Sense
 from ..results.poses import rotation_numbers
 from ..results.rounding import (
+    FLAT,
+    NOISE,
     STATED,
     TURNED,
     ordered,
@@ -122,7 +124,9 @@ class _Rows:
         label = self._units.label(dimension)
         if isinstance(given, Free):
             lower, upper = (self._units.shown(end, dimension) for end in (given.lower, given.upper))
-            shown, between = number(value, upper - lower), free_words(given, self._units, dimension)
+            # A bound holds a value exactly.
+            part = NOISE if name in self._active else FLAT
+            shown, between = number(value, upper - lower, part=part), free_words(given, self._units, dimension)
         else:
             lower, upper = value, value
             shown, between = number(value, beside, part=STATED), ""
@@ -210,7 +214,7 @@ def design_table(
     headers = ("", "reached" if reached else "value", "unit", "bounds", "status", slope)
     columns = len(headers) if any(row.cells[4] for row in rows) else 4
     cells = tuple(row.cells[:columns] for row in rows)
-    return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named)
+    return TextTable(headers[:columns], cells, "design", folded=folded, folded_words=words, named=named, with_unit=(1,))
 
 
 def stated_poses_of(robot: RobotData) -> tuple[PlatformPose, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..evidence.kkt import ACTIVE
 from ..results.data import CombinedData
-from ..results.rounding import NOISE, rate_sizes, settled, settled_F, task_F
+from ..results.rounding import FLAT, NOISE, rate_sizes, settled, settled_F, task_F
 from ..units import Units
 from .joints import motion_words
 from .lines import SET, counted
@@ -93,7 +93,7 @@ def limit_table(limits: Sequence[LimitData], F: float = 0.0, title: str = "") ->
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         rows.append((row.key, limit, row.unit, value, _margin_text(row.margin, beside, word), word, cost, shown))
     headers = ("limit", "allowed", "unit", "nearest value", "margin", "status", "change of F", "where")
-    return TextTable(headers, tuple(rows), "limits", title)
+    return TextTable(headers, tuple(rows), "limits", title, with_unit=(1, 3, 4))
 
 
 def _text(value: float, size: float) -> str:
@@ -148,7 +148,8 @@ def margin_table(margins: Sequence[Margin]) -> TextTable:
         limit, value = number(row.limit, digits=6), _text(row.value, beside)
         cells = (row.name, row.bound, value, limit, _margin_text(row.margin, beside, word), row.unit, word)
         rows.append(cells)
-    return TextTable(("quantity", "bound", "value", "limit", "margin", "unit", "status"), tuple(rows), "margins")
+    headers = ("quantity", "bound", "value", "limit", "margin", "unit", "status")
+    return TextTable(headers, tuple(rows), "margins", with_unit=(2, 3, 4))
 
 
 def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: bool) -> TextTable:
@@ -176,7 +177,7 @@ def active_table(result: SolveResult | CombinedData, F: float, *, is_answer: boo
             f"F better by {slope} {per_words(side.unit)} relaxed",
         )
         rows.append(cells if is_answer else cells[:-1])
-    return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active")
+    return TextTable(headers if is_answer else headers[:-1], tuple(rows), "active", with_unit=(2,))
 
 
 def _violated(result: SolveResult | CombinedData) -> Collection[str]:
@@ -206,7 +207,7 @@ def optimum_table(solution: ProgramSolution, robot: RobotData | None = None) -> 
     for found in solution.optima[:MOST_OPTIMA]:
         spread = f", a set over {100 * found.spread:.0f} % of the ranges" if found.spread > SET else ""
         at = [
-            number(units.shown(float(value), variable.dimension), width, digits=6)
+            number(units.shown(float(value), variable.dimension), width, digits=6, part=FLAT)
             for value, variable, width in zip(found.x, variables, widths, strict=True)
         ]
         F = number(task_F(robot, found.F))

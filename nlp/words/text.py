@@ -83,6 +83,8 @@ class TextTable:
         part: name of the part of the result that the table belongs to; empty for the answer.
         extra: number of the last columns that a short view leaves out where the table is too long for it.
         is_curve: If true, the rows are points of a curve: a short view shows rows in equal steps, not the first rows.
+        with_unit: indices of the columns whose numbers have the unit in the column ``unit``; a page writes the unit
+            beside each of these numbers.
     """
 
     headers: tuple[str, ...]
@@ -95,6 +97,7 @@ class TextTable:
     part: str = ""
     extra: int = 0
     is_curve: bool = False
+    with_unit: tuple[int, ...] = ()
 
 
 def in_part(name: str, items: Iterable[Line | TextTable]) -> Iterator[Line | TextTable]:

@@ -272,4 +272,4 @@ def verdict_table(
     limit, line = ("limit",) * has_limits, ("line",) * bool(lines)
     headers = ("quantity", "unit", "extreme", *limit, "proved bound", "reached", "outcome", *line, "pose")
     if cells:
-        yield TextTable(headers, tuple(cells), name=name, title=title)
+        yield TextTable(headers, tuple(cells), name=name, title=title, with_unit=tuple(range(3, 5 + has_limits)))

@@ -374,7 +374,10 @@ const beside = [];
 shown.forEach((one, k) => shown.slice(k + 1).forEach((other) => {
   const a = one.getBoundingClientRect(), b = other.getBoundingClientRect();
   const isInside = one.contains(other) || other.contains(one);
-  if (!isInside && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2) beside.push(one.outerHTML.slice(0, 60));
+  // Drawings of designs have no text.
+  const isDesign = one.closest(".designs") && other.closest(".designs");
+  const overlap = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+  if (!isInside && !isDesign && overlap > 2) beside.push(one.outerHTML.slice(0, 60));
 }));
 return [shown.length, beside, innerWidth, document.documentElement.scrollWidth];"""
 
@@ -408,5 +411,52 @@ def test_panels_stand_below_each_other_on_a_narrow_screen(browser: Any, cli: Run
             assert width <= 420, name
             assert shown, name
             assert beside == [], name
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+#: Heights of the page, of its highest row of a table, and of its highest box of a table; the page's width.
+HEIGHTS = """
+const highest = (found) => Math.max(...[...document.querySelectorAll(found)].map((each) => each.offsetHeight));
+return [document.documentElement.scrollHeight, highest("#swept tbody tr"), highest(".scroll.tall"),
+  document.documentElement.scrollWidth];"""
+#: Offset of the point of each number of a column from the left edge of its cell.
+POINTS = """
+return [...document.querySelectorAll("#swept tbody tr")].map((row) => {
+  const cell = row.children[arguments[0]], range = document.createRange();
+  const texts = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
+  for (let text = texts.nextNode(); text; text = texts.nextNode()) {
+    const at = text.data.indexOf(".");
+    if (at >= 0) {
+      range.setStart(text, at); range.setEnd(text, at + 1);
+      return range.getBoundingClientRect().left - cell.getBoundingClientRect().left;
+    }
+  }
+  return null;
+}).filter((each) => each !== null);"""
+
+
+@pytest.mark.browser
+@pytest.mark.slow  # 81 solves, and a browser
+@pytest.mark.parametrize("width", [1400, 420])
+def test_a_sweep_of_many_points_is_a_short_page(browser: Any, cli: Run, tmp_path: Path, width: int) -> None:
+    case, page = str(saved(tmp_path / "case.toml", CASE)), tmp_path / "sweep.html"
+    points = ("--over", "limits.leg_length.max=18:34:81", "--starts", "1", "--engine", "ipopt")
+    assert cli("sweep", case, *points, "--out", str(tmp_path / "sweep.csv"), "--html", str(page))[2] == ""
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size_of_window(width))
+    try:
+        browser.get(page.as_uri())
+        whole, row, box, across = browser.execute_script(HEIGHTS)
+        assert across <= width
+        assert whole < 3000
+        assert row < 40
+        assert box <= 480
+        # Numbers of a column with one and two digits before the point, such as p_x, have their points in one line.
+        heads = browser.execute_script(
+            "return [...document.querySelectorAll('#swept thead tr > *')].map(e => e.innerText)"
+        )
+        places = [browser.execute_script(POINTS, k) for k in range(1, len(heads))]
+        assert any(len(each) > 10 for each in places)
+        assert all(max(each) - min(each) < 1 for each in places if each)
     finally:
         browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -69,8 +69,8 @@ def turning(task: str = "task", **rest: Any) -> sn.Case:  # noqa: ANN401 - parts
 def test_a_notebook_shows_table_and_drawing(solution: sn.Solution, certified: sn.Certified) -> None:
     for value, words in (
         (stewart_gough(), ["x1", "x2"]),
-        (solution.case, ["x1", "p_x", "-10 .. 10", "-30 .. 30"]),
-        (solution, ["p_x", "2+", "-10 .. 10"]),
+        (solution.case, ["x1", "p_x", "\N{MINUS SIGN}10 .. 10", "\N{MINUS SIGN}30 .. 30"]),
+        (solution, ["p_x", "2+", "\N{MINUS SIGN}10 .. 10"]),
         (certified, ["p_z"]),
     ):
         html = value._repr_html_() or ""

@@ -34,7 +34,7 @@ def test_two_objectives_on_a_line(case: str, tmp_path: Path, cli: Run) -> None:
     out, picture = tmp_path / "front.csv", tmp_path / "front.svg"
     goals = ("--goal", "max F:up", "--goal", "max F:side")
     said = output_of(cli("pareto", case, *goals, "--points", "9", "--csv", str(out), "--plot", str(picture)))
-    assert said.startswith("9 points on the front of max F:up and max F:side\n")
+    assert said.startswith("Pareto front of 9 points: largest F of up and largest F of side\n")
     rows = rows_of(out.read_text())
     # The terminal has the same points.
     shown = [line.split()[:2] for line in said.splitlines()[-9:]]
@@ -72,7 +72,7 @@ def test_a_limit_as_a_goal_with_proofs(case: str, cli: Run) -> None:
 
 def test_goals_without_conflict_have_one_point(case: str, cli: Run) -> None:
     code, said, _ = cli("pareto", case, "--goal", "max F:up", "--goal", "min F:side")
-    assert (code, said.splitlines()[0]) == (0, "1 point on the front of max F:up and min F:side")
+    assert (code, said.splitlines()[0]) == (0, "Pareto front of 1 point: largest F of up and smallest F of side")
 
 
 # Six parallel legs along the platform's position p: F of the translation along an axis is 6 p_i^2 / |p|^2, and each leg
@@ -111,7 +111,7 @@ def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
     goals = ("--goal", "max F:x", "--goal", "min limits.leg_length.max", "--goal", "max F:y")
     options = [word for file in files for word in (f"--{file.suffix[1:]}", str(file))]
     code, said, err = cli("pareto", str(path), *goals, "--points", "12", *options)
-    assert (code, err, said.partition(" points")[0]) == (0, "", "12")
+    assert (code, err, said.partition(" points")[0]) == (0, "", "Pareto front of 12")
     rows = rows_of(files[0].read_text())
     x, y, length = (np.array([float(row[name]) for row in rows]) for name in ("F:x", "F:y", "limits.leg_length.max"))
     assert x + y == pytest.approx(6 - 600 / length**2, abs=1e-7)

@@ -26,8 +26,9 @@ from screwsynth.models.joints.home.mechanisms import mechanism_of
 from screwsynth.nlp import InputError, Solution, Status, Units, json_data, load_case, load_result, result_of, solve
 from screwsynth.nlp.cli.usage import EARLIER
 from screwsynth.nlp.output.checks import markdown
-from screwsynth.nlp.output.report.markup import html_table, paragraphs
+from screwsynth.nlp.output.report.markup import paragraphs
 from screwsynth.nlp.output.report.report import report_of
+from screwsynth.nlp.output.report.tables import html_table
 from screwsynth.nlp.output.report.webpage import page_of
 from screwsynth.nlp.results import data, parts
 from screwsynth.nlp.results.checks import check_case

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator
 
 from ...errors import EvaluationError
 from ...words.designs import ColumnKind, Designs, Join, Row
@@ -20,6 +22,33 @@ from .view import View, clearest_view
 
 #: Width and height of a picture, inches.
 _SIZE = (2.9, 2.6)
+#: Width and height of a chart on a narrow page, inches, and number of letters in a line of an axis label.
+_NARROW, _LETTERS = (4.0, 3.4), 38
+
+
+def page_figure(designs: Designs[Row], *, is_narrow: bool = False) -> Figure:
+    """Return the picture of a table of designs for a page, which has the title and the legend itself.
+
+    Args:
+        designs: table of designs.
+        is_narrow: If true, the picture has the width of a telephone.
+
+    Raises:
+        EvaluationError: no design can be drawn.
+    """
+    figure = designs_figure(designs, is_on_page=True)
+    for axes in figure.axes:
+        axes.set_title("", loc="left")
+    figure.suptitle("")
+    if is_narrow:
+        figure.set_size_inches(*_NARROW)
+        for axes in figure.axes:
+            for label in (axes.xaxis.label, axes.yaxis.label):
+                label.set_text(textwrap.fill(label.get_text(), _LETTERS))
+            if isinstance(axes.xaxis.get_major_locator(), FixedLocator):
+                texts = [text.get_text() for text in axes.get_xticklabels()]
+                axes.set_xticks(axes.get_xticks()[::2], texts[::2])
+    return figure
 
 
 def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure:

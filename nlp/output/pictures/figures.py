@@ -44,8 +44,28 @@ _METADATA: dict[str, dict[str, str | None]] = {
 _ACROSS = 3
 #: Width and height of a panel, and room for the heading, the legend and the colour bar, in inches.
 _WIDTH, _HEIGHT, _TOP, _BOTTOM, _SIDE = 7.2, 6.0, 0.95, 1.1, 1.15
+#: Width and height of a picture on a narrow page, in inches.
+_NARROW = (4.2, 3.8)
 #: Room for the line of joint symbols, in inches.
 _SYMBOLS = 0.22
+
+
+def page_pictures(drawing: Drawing) -> tuple[bytes, bytes]:
+    """Return SVG pictures of a robot for a wide and a narrow page, which has the heading itself.
+
+    The narrow picture has no colour bar and no legend of lines.
+    """
+    return picture_of(".svg", figure_of, [drawing], on_page=True), picture_of(".svg", _narrow_figure, drawing)
+
+
+def _narrow_figure(drawing: Drawing) -> Figure:
+    """Return a picture of a robot with labels as large as the text of a narrow page."""
+    figure = Figure(figsize=_NARROW, facecolor="white")
+    canvas = FigureCanvasAgg(figure)
+    panel = Panel(figure.add_axes((0, 0, 1, 1)), clearest_view(drawing), drawing)
+    panel.paint()
+    panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
+    return figure
 
 
 def picture(drawings: Sequence[Drawing], ending: str, *, view: View | None = None) -> bytes:
@@ -79,8 +99,10 @@ def picture_of(ending: str, make: Callable[_P, Figure], *values: _P.args, **opti
     return content.getvalue()
 
 
-def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figure:
+def figure_of(drawings: Sequence[Drawing], *, view: View | None = None, on_page: bool = False) -> Figure:
     """Return a picture as a Matplotlib figure; arguments as for :func:`picture`.
+
+    A picture on a page has no heading, because the page has it.
 
     Every artist of a part of the robot has the name of the part as ``gid``: ``limb 1``, ``couple 1``, ``axis``,
     ``path``, ``velocity A1``, ``start limb 1``, ``mark x1``, ``joint B1``.
@@ -89,7 +111,8 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
     across = len(drawings) if len(drawings) <= _ACROSS else 2
     side = _SIDE if drawings[0].rows else 0.2
     room = _BOTTOM + (_SYMBOLS if any(each.model.scene.joints for each in drawings) else 0.0)
-    row_height = _HEIGHT + _TOP + room
+    above = 0.1 if on_page else _TOP
+    row_height = _HEIGHT + above + room
     width, height = across * (_WIDTH + side), -(-len(drawings) // across) * row_height
     figure = Figure(figsize=(width, height), facecolor="white")
     canvas = FigureCanvasAgg(figure)
@@ -105,11 +128,12 @@ def figure_of(drawings: Sequence[Drawing], *, view: View | None = None) -> Figur
             bar = add_colour_bar(figure, (*corner, 0.16 / width, 0.5 * row_height / height), drawing, panel.largest)
             bar.ax.hlines([row.rate for row in drawing.rows], 0, 1, color=INK, linewidth=1.0, gid="rates")
         panel.write(canvas.get_renderer())  # type: ignore[no-untyped-call]
-        low = bottom + 0.02 * (_HEIGHT + _TOP + _BOTTOM)
+        low = bottom + 0.02 * (_HEIGHT + above + _BOTTOM)
         if panel.symbols:
             add_legend(figure, (left + 0.25) / width, low / height, panel.symbols, len(panel.symbols))
         add_legend(figure, (left + 0.25) / width, (low + room - _BOTTOM) / height, panel.legend)
-        _write_heading(figure, (left + 0.25) / width, top / height, height, drawing)
+        if not on_page:
+            _write_heading(figure, (left + 0.25) / width, top / height, height, drawing)
     return figure
 
 

@@ -12,6 +12,8 @@ from .markup import Markup, join_markup, tag
 #: Width and height of a chart in units of its viewBox, and the margins for its axes.
 _WIDTH, _HEIGHT = 320.0, 190.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 12.0, 10.0, 38.0
+#: Height of a strip, and room between two strips.
+_STRIP, _BETWEEN = 46.0, 6.0
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def line_chart(
         return tag("p", f"{words} No chart: F has no value here.")
     across = _range_with_room(min(xs), max(xs), 0.03) if ends is None else _range_with_room(*ends, 0.0)
     scale = _Scale(across, _range_with_room(min(ys), max(ys), 0.08))
-    floor = _HEIGHT - _BOTTOM
+    floor = scale.floor
     parts: list[object] = [_band(scale, each) for each in bands]
     parts += _axes(scale, labels)
     parts += [tag("path", d=f"M{_LEFT:g} {scale.y(y):.1f}H{_WIDTH - _RIGHT:g}", class_="level") for y in levels]
@@ -96,17 +98,75 @@ def line_chart(
         place = {"cx": f"{scale.x(spot.x):.1f}", "cy": f"{scale.y(spot.y):.1f}", "r": "4.5"}
         parts.append(tag("circle", tag("title", spot.words), class_=spot.kind, **place))
     if has_cursor:
-        # The script sets the position as a fraction of the axis.
-        start, width = scale.x(scale.across[0]), scale.x(scale.across[1]) - scale.x(scale.across[0])
-        ways = {"data_low": scale.across[0], "data_high": scale.across[1], "data_left": start, "data_width": width}
-        parts.append(tag("path", d=f"M0 {_TOP:g}V{floor:g}", class_="cursor", **ways))
+        parts.append(_cursor(scale, floor))
     return _svg(parts, words)
+
+
+def _cursor(scale: _Scale, floor: float) -> Markup:
+    """Return the vertical line that follows a slider; the script sets its position as a fraction of the axis."""
+    start, width = scale.x(scale.across[0]), scale.x(scale.across[1]) - scale.x(scale.across[0])
+    ways = {"data_low": scale.across[0], "data_high": scale.across[1], "data_left": start, "data_width": width}
+    return tag("path", d=f"M0 {_TOP:g}V{floor:g}", class_="cursor", **ways)
+
+
+class Strip(NamedTuple):
+    """Strip of a chart: its name and its lines."""
+
+    name: str
+    curves: Sequence[Curve]
+
+
+def strip_chart(
+    strips: Sequence[Strip],
+    *,
+    words: str,
+    labels: tuple[str, str],
+    bounds: Sequence[float] = (),
+    levels: Sequence[float] = (),
+    bands: Sequence[Band] = (),
+    ends: tuple[float, float],
+) -> Markup:
+    """Return a chart with a strip for each name, one below the other, with common scales and a cursor.
+
+    Lines that change quickly would cover each other in one strip.
+
+    Args:
+        strips: strips of the chart, at least one.
+        words: text alternative of the chart, a sentence.
+        labels: labels of the horizontal and the vertical axis.
+        bounds: values on the horizontal axis with vertical lines.
+        levels: values on the vertical axis with horizontal lines.
+        bands: shaded intervals of the horizontal axis.
+        ends: ends of the horizontal axis.
+    """
+    ys = [y for strip in strips for curve in strip.curves for y in curve.y if math.isfinite(y)]
+    if not ys:
+        return tag("p", f"{words} No chart: no value is known here.")
+    low, high = min([*ys, *levels]), max([*ys, *levels])
+    across, up = _range_with_room(*ends, 0.0), _range_with_room(low, high, 0.08)
+    floor, right = _TOP + len(strips) * _STRIP, _WIDTH - _RIGHT
+    whole = _Scale(across, up, _TOP, floor)
+    parts: list[object] = [_band(whole, each) for each in bands]
+    for k, strip in enumerate(strips):
+        scale = _Scale(across, up, _TOP + k * _STRIP, _TOP + (k + 1) * _STRIP - _BETWEEN)
+        for value in _ticks(*up, 2):
+            y = scale.y(value)
+            parts.append(tag("path", d=f"M{_LEFT:g} {y:.1f}H{right:g}", class_="rule"))
+            parts.append(tag("text", _tick_text(value), x=f"{_LEFT - 5:g}", y=f"{y + 3:.1f}", class_="tick small end"))
+        parts += [tag("path", d=f"M{_LEFT:g} {scale.y(y):.1f}H{right:g}", class_="level") for y in levels]
+        parts += [tag("path", d=_path(scale, curve), class_=curve.kind) for curve in strip.curves]
+        parts.append(tag("path", d=f"M{_LEFT:g} {scale.top:g}V{scale.floor:g}H{right:g}", class_="axis"))
+        parts.append(tag("text", strip.name, x=f"{_LEFT + 4:g}", y=f"{scale.top + 9:g}", class_="strip"))
+    parts += [tag("path", d=f"M{whole.x(x):.1f} {_TOP:g}V{floor:g}", class_="bound") for x in bounds]
+    parts += [*_axis_across(whole, labels[0], floor), _axis_label(labels[1], (_TOP + floor) / 2)]
+    parts.append(_cursor(whole, floor))
+    return _svg(parts, words, floor + _BOTTOM)
 
 
 def _band(scale: _Scale, band: Band) -> Markup:
     """Return a shaded interval of the horizontal axis."""
     left, right = scale.x(band.start), scale.x(band.end)
-    size = {"width": f"{max(right - left, 0.5):.1f}", "height": f"{_HEIGHT - _BOTTOM - _TOP:g}"}
+    size = {"width": f"{max(right - left, 0.5):.1f}", "height": f"{scale.floor - scale.top:g}"}
     return tag("rect", x=f"{left:.1f}", y=f"{_TOP:g}", class_=band.kind, **size)
 
 
@@ -136,10 +196,13 @@ class _Scale:
 
     Attributes:
         across, up: range of values on the horizontal and on the vertical axis.
+        top, floor: ends of the vertical axis, in units of the viewBox.
     """
 
     across: tuple[float, float]
     up: tuple[float, float]
+    top: float = _TOP
+    floor: float = _HEIGHT - _BOTTOM
 
     def x(self, value: float) -> float:
         low, high = self.across
@@ -147,34 +210,42 @@ class _Scale:
 
     def y(self, value: float) -> float:
         low, high = self.up
-        return _HEIGHT - _BOTTOM - (value - low) / (high - low) * (_HEIGHT - _TOP - _BOTTOM)
+        return self.floor - (value - low) / (high - low) * (self.floor - self.top)
 
 
-def _svg(parts: Sequence[object], words: str) -> Markup:
+def _svg(parts: Sequence[object], words: str, height: float = _HEIGHT) -> Markup:
     """Return a chart with its text alternative."""
     return tag(
-        "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label=words, class_="chart"
+        "svg", join_markup(parts), viewBox=f"0 0 {_WIDTH:g} {height:g}", role="img", aria_label=words, class_="chart"
     )
 
 
 def _axes(scale: _Scale, labels: tuple[str, str]) -> list[Markup]:
     """Return the axes with ticks and labels."""
-    floor, right = _HEIGHT - _BOTTOM, _WIDTH - _RIGHT
-    parts = []
-    for value in _ticks(*scale.across, 5):
-        x = f"{scale.x(value):.1f}"
-        parts.append(tag("text", _tick_text(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
+    floor, right = scale.floor, _WIDTH - _RIGHT
+    parts = _axis_across(scale, labels[0], floor)
     for value in _ticks(*scale.up, 5):
         y = scale.y(value)
         parts.append(tag("path", d=f"M{_LEFT:g} {y:.1f}H{right:g}", class_="rule"))
         parts.append(tag("text", _tick_text(value), x=f"{_LEFT - 5:g}", y=f"{y + 3.5:.1f}", class_="tick end"))
     parts.append(tag("path", d=f"M{_LEFT:g} {_TOP:g}V{floor:g}H{right:g}", class_="axis"))
-    middle = (_LEFT + right) / 2
-    parts.append(tag("text", labels[0], x=f"{middle:g}", y=f"{_HEIGHT - 6:g}", class_="label middle"))
-    height = (_TOP + floor) / 2
-    turned = f"rotate(-90 12 {height:g})"
-    parts.append(tag("text", labels[1], x="12", y=f"{height:g}", transform=turned, class_="label middle"))
+    parts.append(_axis_label(labels[1], (_TOP + floor) / 2))
     return parts
+
+
+def _axis_across(scale: _Scale, label: str, floor: float) -> list[Markup]:
+    """Return the ticks and the label of the horizontal axis, below a height."""
+    parts = []
+    for value in _ticks(*scale.across, 5):
+        x = f"{scale.x(value):.1f}"
+        parts.append(tag("text", _tick_text(value), x=x, y=f"{floor + 14:g}", class_="tick middle"))
+    middle = (_LEFT + _WIDTH - _RIGHT) / 2
+    return [*parts, tag("text", label, x=f"{middle:g}", y=f"{floor + _BOTTOM - 6:g}", class_="label middle")]
+
+
+def _axis_label(label: str, height: float) -> Markup:
+    """Return the turned label of the vertical axis at a height."""
+    return tag("text", label, x="12", y=f"{height:g}", transform=f"rotate(-90 12 {height:g})", class_="label middle")
 
 
 def _path(scale: _Scale, curve: Curve) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import EvaluationError
 from ...words.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
-from ..pictures.designs import design_pictures, designs_figure, legend_of
+from ..pictures.designs import design_pictures, legend_of, page_figure
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.figures import picture_of
 from ..pictures.robots import robot_pictures
@@ -18,7 +18,6 @@ from .markup import (
     Markup,
     answer_box,
     contents_and_body,
-    html_table,
     image_source,
     join_markup,
     paragraphs,
@@ -26,6 +25,7 @@ from .markup import (
     tag,
     whole_page,
 )
+from .tables import html_table
 
 #: Largest number of drawn designs, and of table rows on a page: a browser is slow with many more.
 _MOST, _ROWS = 12, 500
@@ -58,7 +58,7 @@ def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     page, designs = table.page, table.drawn()
     aside = bend_lines(designs, page.bends) if page.bends else Markup("")
     if page.is_answer and (legend := legend_of(table)):
-        aside = tag("ul", *(tag("li", line) for line in legend), class_="plain")
+        aside = tag("ul", *(tag("li", line) for line in legend), class_="plain", tabindex="0")
     beside = tag("div", tag("div", _picture(table), class_="wide"), aside, class_="beside")
     yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
     yield "designs", page.designs, design_figures(designs)
@@ -73,10 +73,10 @@ def _picture(designs: Designs[Row]) -> Markup:
     if not page.is_answer:
         return Markup("")
     try:
-        picture = picture_of(".svg", designs_figure, designs, is_on_page=True)
+        wide, narrow = (picture_of(".svg", page_figure, designs, is_narrow=each) for each in (False, True))
     except EvaluationError as error:
         return paragraphs([f"{error}."])
-    return picture_figure(picture, page.below)
+    return picture_figure(wide, narrow, page.below)
 
 
 def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
@@ -139,7 +139,7 @@ def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
     ]
     if not lines:
         return Markup("")
-    return tag("div", tag("h3", heading), tag("ul", *(tag("li", line) for line in lines), id="bends"))
+    return tag("div", tag("h3", heading), tag("ul", *(tag("li", line) for line in lines), id="bends", tabindex="0"))
 
 
 def design_figures(designs: Sequence[DrawnDesign]) -> Markup:
@@ -153,12 +153,17 @@ def design_figures(designs: Sequence[DrawnDesign]) -> Markup:
         tag(
             "figure",
             tag("img", src=image_source(content), alt=f"Robot at {each.name}"),
-            tag("figcaption", tag("b", each.name), f": {each.words}", tag("small", ", ".join(each.numbers))),
+            tag("figcaption", tag("b", each.name), f": {each.words}", _numbers(each.numbers)),
         )
         for (each, _), content in zip(shown, pictures, strict=True)
     ]
     few = [] if len(shown) == len(designs) else [f"{len(shown)} of {len(designs)} designs are shown."]
     return join_markup([paragraphs([_WORDS, *few]), tag("div", *figures, class_="designs")])
+
+
+def _numbers(numbers: Sequence[str]) -> Markup:
+    """Return the variables of a design, shown on request."""
+    return tag("details", tag("summary", "Dimensions and pose"), tag("small", ", ".join(numbers)))
 
 
 def _drawing(design: DrawnDesign) -> Drawing | None:

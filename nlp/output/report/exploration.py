@@ -22,9 +22,10 @@ from ...words.tradeoff import tradeoff_designs
 from .charts import Curve, Spot, count_chart, line_chart
 from .curves import curve_figures
 from .designs import designs_rows
-from .markup import Markup, html_table, join_markup, paragraphs, script_frame, tag
+from .markup import Markup, join_markup, paragraphs, script_frame, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
+from .tables import html_table
 
 _ENCLOSED = (
     "Optimal F over the active limits with the largest effect. Each point of a curve is a new solve from a few "

@@ -8,14 +8,14 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from html import escape
 from importlib.resources import files
 from string import Template
 from typing import Any
 
-from ...words.text import Line, TextTable
+from ...words.text import Line
 
 
 class Markup(str):
@@ -24,10 +24,14 @@ class Markup(str):
     __slots__ = ()
 
 
-#: Length of a number below which its cell is not wrapped.
-_SHORT = 24
 #: Elements without an end tag.
-_VOID = frozenset(["meta", "link", "input", "br", "img"])
+_VOID = frozenset(["meta", "link", "input", "br", "img", "source"])
+#: Elements whose text is copied into a shell or a file, character by character.
+_EXACT = frozenset(["code", "title"])
+#: Attributes that are read to people.
+_READ = frozenset(["aria_label", "aria_valuetext", "alt"])
+#: Hyphen that is the sign of a number or of an exponent, not part of a name such as limb 1- or 6-PUS.
+_SIGN = re.compile(r"(?<![\w.)\]\"'-])-(?=\.?\d)|(?<=\de)-(?=\d)")
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
@@ -44,13 +48,28 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
         if value is None or value is False:
             continue
         label = key.rstrip("_").replace("_", "-")
-        parts.append(label if value is True else f'{label}="{escape(str(value))}"')
+        text = with_minus(str(value)) if key in _READ else str(value)
+        parts.append(label if value is True else f'{label}="{escape(text)}"')
     opening = f"<{' '.join(parts)}>"
-    return Markup(opening if name in _VOID else f"{opening}{join_markup(content)}</{name}>")
+    if name in _VOID:
+        return Markup(opening)
+    return Markup(f"{opening}{_exact_markup(content) if name in _EXACT else join_markup(content)}</{name}>")
+
+
+def with_minus(text: str) -> str:
+    """Return a text with the minus sign, U+2212, at its negative numbers."""
+    return _SIGN.sub("\N{MINUS SIGN}", text)
 
 
 def join_markup(content: Iterable[object]) -> Markup:
-    """Return several pieces of content as one piece; text is escaped."""
+    """Return several pieces of content as one piece; text is escaped, and its negative numbers get a minus sign."""
+    return _exact_markup(
+        part if part is None or isinstance(part, Markup) else with_minus(str(part)) for part in content
+    )
+
+
+def _exact_markup(content: Iterable[object]) -> Markup:
+    """Return several pieces of content as one piece; text is escaped and has its own characters."""
     return Markup(
         "".join(part if isinstance(part, Markup) else escape(str(part)) for part in content if part is not None)
     )
@@ -67,33 +86,8 @@ def _line(line: Line | str) -> object:
         return line
     if not line.label:
         return line.words
-    return join_markup([tag("span", f"{line.label}:", class_="label"), " ", line.words])
-
-
-def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
-    """Return an HTML table, whose first column names the rows; a wide table can be scrolled, also by keyboard.
-
-    Args:
-        table: table of texts.
-        caption: caption of the table.
-        attributes: attributes of the element, as for :func:`tag`.
-    """
-    headers = [header.replace("\n", ", ") for header in table.headers]
-    # An empty header is an ordinary cell, since it names nothing.
-    head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
-    body = []
-    for row in table.rows[: len(table.rows) - table.folded]:
-        first, *others = (cell.words if isinstance(cell, Line) else cell for cell in row)
-        body.append(tag("tr", tag("th", first, scope="row"), *(_cell(cell) for cell in others)))
-    whole = tag("table", tag("caption", caption), tag("thead", head), tag("tbody", *body), **attributes)
-    shown = tag("div", whole, class_="scroll", tabindex="0", role="region", aria_label=caption)
-    if not table.folded:
-        return shown
-    words = f"{table.folded} {table.folded_words}"
-    rest = replace(table, rows=table.rows[len(table.rows) - table.folded :], folded=0)
-    anchor = f"{attributes['id']}-folded" if "id" in attributes else None
-    folded = tag("details", tag("summary", words), html_table(rest, f"{caption}: {words}", id=anchor))
-    return join_markup([shown, folded])
+    words = tag("code", line.words) if line.is_command else line.words
+    return join_markup([tag("span", f"{line.label}:", class_="label"), " ", words])
 
 
 def script_frame(key: str, name: str, words: str) -> Markup:
@@ -135,16 +129,6 @@ def script_json(data: Any) -> Markup:  # noqa: ANN401 - whatever JSON can hold
     for sign in "<>&":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return Markup(text)
-
-
-def _cell(text: str) -> Markup:
-    """Return a cell of a table, with a class for a short number."""
-    return tag("td", text, class_="number" if _is_short_number(text) else None)
-
-
-def _is_short_number(text: str) -> bool:
-    """Return whether a text is a number that is too short to be wrapped."""
-    return len(text) < _SHORT and (text[:1].isdigit() or text[:1] in {"+", "-"})
 
 
 def whole_page(
@@ -215,15 +199,21 @@ def contents_and_body(sections: Iterable[tuple[str, str, Markup]]) -> tuple[Mark
     return contents, body
 
 
-def picture_figure(svg: bytes, words: str) -> Markup:
+def picture_figure(svg: bytes, narrow: bytes, words: str) -> Markup:
     """Return a picture as a figure of a page.
 
     Args:
         svg: content of the SVG file.
+        narrow: content of the SVG file for a narrow window.
         words: caption and text alternative of the picture.
     """
-    image = tag("img", src=image_source(svg), alt=words)
-    return tag("figure", image, tag("figcaption", words))
+    return tag("figure", picture_element(svg, narrow, alt=words), tag("figcaption", words))
+
+
+def picture_element(svg: bytes, narrow: bytes, **attributes: object) -> Markup:
+    """Return an SVG picture with another one for narrow windows; the attributes are those of the image."""
+    source = tag("source", media="(max-width: 34rem)", srcset=image_source(narrow))
+    return tag("picture", source, tag("img", src=image_source(svg), **attributes))
 
 
 def image_source(content: bytes, kind: str = "svg+xml") -> str:

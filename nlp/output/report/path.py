@@ -21,7 +21,7 @@ from ..pictures.pathpanels import (
     marks_text,
     nearest_parts,
 )
-from .charts import Band, Curve, line_chart
+from .charts import Band, Curve, Strip, line_chart, strip_chart
 from .markup import (
     Markup,
     answer_box,
@@ -173,13 +173,14 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     """Return the chart of a panel."""
     at = picture.at[shown].tolist()
     count = len(ACTUATOR_COLOURS)
-    curves = [
-        Curve(at, each.values[shown].tolist(), f"curve a{each.place % count}{' other' * each.is_other}")
-        for each in panel.curves
-    ]
+    names, strips = actuator_names(picture), dict[int, list[Curve]]()
+    for each in panel.curves:
+        kind = f"curve a{each.place % count}{' other' * each.is_other}"
+        strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
     ends = f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else ": no known value"
-    return _chart(picture, curves, f"{panel.title}{ends}", panel.unit, panel.limits)
+    named = [Strip(f"actuator {names[place]}", curves) for place, curves in strips.items()]
+    return _chart(picture, named, f"{panel.title}{ends}", panel.unit, panel.limits)
 
 
 def _margins(picture: PathPicture, shown: list[int]) -> Markup:
@@ -192,24 +193,35 @@ def _margins(picture: PathPicture, shown: list[int]) -> Markup:
     known = picture.margins[np.isfinite(picture.margins)]
     words = f"smallest margin of all limits, at least {known.min():.3g} %" if known.size else "no known margin"
     return _chart(
-        picture, curves or [Curve(at, picture.drawn_margins[shown].tolist(), "curve")], words, "margin, %", (0.0,)
+        picture,
+        [Strip("", curves or [Curve(at, picture.drawn_margins[shown].tolist(), "curve")])],
+        words,
+        "margin, %",
+        (0.0,),
     )
 
 
-def _chart(picture: PathPicture, curves: list[Curve], words: str, label: str, limits: tuple[float, ...]) -> Markup:
+def _chart(picture: PathPicture, strips: list[Strip], words: str, label: str, limits: tuple[float, ...]) -> Markup:
     """Return a chart over the position along the path, with violations and segments that are not proved."""
     words = f"{words[0].upper()}{words[1:]}."
-    chart = line_chart(
-        curves,
-        [],
-        words=words,
-        labels=(picture.label, label),
-        bounds=[each.at for each in picture.marks],
-        levels=limits,
-        bands=[Band(each.start, each.end, "refuted" if each.is_refuted else "open") for each in picture.bands],
-        ends=(float(picture.way.knots[0]), float(picture.way.knots[-1])),
-        has_cursor=True,
-    )
+    labels, bounds = (picture.label, label), [each.at for each in picture.marks]
+    bands = [Band(each.start, each.end, "refuted" if each.is_refuted else "open") for each in picture.bands]
+    ends = (float(picture.way.knots[0]), float(picture.way.knots[-1]))
+    if len(strips) == 1:
+        curves = strips[0].curves
+        chart = line_chart(
+            curves,
+            [],
+            words=words,
+            labels=labels,
+            bounds=bounds,
+            levels=limits,
+            bands=bands,
+            ends=ends,
+            has_cursor=True,
+        )
+    else:
+        chart = strip_chart(strips, words=words, labels=labels, bounds=bounds, levels=limits, bands=bands, ends=ends)
     return tag("figure", tag("figcaption", words), chart)
 
 

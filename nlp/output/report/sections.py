@@ -35,9 +35,10 @@ from ...words.tables import active_table, limit_table, limits_title, margin_tabl
 from ...words.workspace import proof_lines, proof_tables
 from .charts import Curve, Spot, line_chart
 from .exploration import optima, surroundings
-from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .markup import Markup, join_markup, paragraphs, tag
 from .report import Report
 from .robotview import robot_section
+from .tables import html_table
 
 
 def evidence_section(report: Report) -> Markup:

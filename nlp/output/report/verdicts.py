@@ -7,7 +7,8 @@ from collections.abc import Iterable
 from ...results.parts import VersionsData
 from ...words.tables import origin_table
 from ...words.text import Line, TextTable
-from .markup import Markup, html_table, join_markup, paragraphs, tag
+from .markup import Markup, join_markup, paragraphs, tag
+from .tables import html_table
 
 
 def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> Markup:

@@ -18,19 +18,20 @@ from ...words.poses import pose_words
 from ...words.text import TextTable
 from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
-from ..pictures.figures import picture
+from ..pictures.figures import page_pictures
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (
     Markup,
     answer_box,
     contents_and_body,
-    html_table,
     image_source,
     join_markup,
     paragraphs,
+    picture_element,
     tag,
     whole_page,
 )
+from .tables import html_table
 from .verdicts import origin, refuting_place, shown_command, shown_verdicts
 
 
@@ -115,11 +116,11 @@ def _robot(report: WorkspaceReport) -> Markup:
     if worst is None:
         return Markup("")
     try:
-        content = picture([drawing_at(report.case, worst)], ".svg")
+        wide, narrow = page_pictures(drawing_at(report.case, worst))
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = tag("img", src=image_source(content), alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
+    image = picture_element(wide, narrow, alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
     figure = tag("figure", image, tag("figcaption", f"Robot at its worst pose, {at}: {claim_words(worst)}."))
     return join_markup([figure, shown_command(report.command(worst.pose))])
 
