@@ -99,7 +99,7 @@ from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
-from .output.report.webpage import report as report
+from .output.live.embed import report as report
 from .output.sweeptable import sweep as sweep
 from .path.options import PathOptions as PathOptions
 from .path.path import ProgrammedPath as ProgrammedPath

@@ -6,6 +6,7 @@ import { axesOf, colourOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
 import { LimitBars, Sliders, TaskFields, byId, showValues } from "./panel.js";
 import { ValueMap } from "./map.js";
+import { Player } from "./play.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -48,7 +49,7 @@ const limbValues = (view) => {
 };
 
 const draw = () => {
-  const view = state ? state.module.arrays.view : data.view;
+  const view = player?.view ?? (state ? state.module.arrays.view : data.view);
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
   const p = state ? state.module.arrays.p : data.p;
   const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
@@ -88,6 +89,8 @@ let map;
 let fields;
 /** @type {LimitBars | undefined} */
 let bars;
+/** @type {Player | undefined} */
+let player;
 /** @type {Map<any, () => void>} */
 const pending = new Map();
 /**
@@ -96,6 +99,8 @@ const pending = new Map();
  * @param {any} [key]
  */
 const change = (act, key = Symbol("change")) => {
+  // Any other change ends a motion, at the pose where it began.
+  if (key !== player) player?.stop();
   pending.set(key, act);
   if (isWaiting) return;
   isWaiting = true;
@@ -197,10 +202,13 @@ if (data.has_module) {
   bars = new LimitBars(state, change);
   fields = new TaskFields(state, change);
   map = new ValueMap(state, change);
+  player = new Player(state, data, change);
   listen();
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
-  Object.assign(globalThis, { screwsynth: { state, show, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
+  Object.assign(globalThis, { screwsynth: { state, show, player, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
   show();
+} else {
+  player = new Player(null, data, change);
 }
 document.documentElement.dataset.ready = "yes";
