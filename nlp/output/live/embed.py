@@ -25,18 +25,13 @@ _WRITTEN = "# Case file written by Case.to_toml().\n"
 _NO_CASE_FILE = "No case file can represent this case: "
 
 
-def embedded(parts: LiveParts, scripts: Sequence[str] = SCRIPTS) -> LiveView:
-    """Return the live view for another page; without a module, only the reason.
-
-    Args:
-        parts: pieces of the view.
-        scripts: modules of its script, without the one that embeds it.
-    """
+def embedded(parts: LiveParts) -> LiveView:
+    """Return the live view for another page; without a module, only the reason."""
     if parts.fault:
         return LiveView(tag("p", f"This page has no sliders: {parts.fault}.", class_="note"), is_live=False)
     headline = tag("div", parts.answer, id="answer", class_="answer", role="status", aria_live="polite")
     content = [tag("style", parts.style), parts.task, headline, tag("div", parts.body, class_="live-main")]
-    script = script_text(("embed.js", *scripts))
+    script = script_text(("embed.js", *SCRIPTS))
     return LiveView(
         join_markup(
             [

@@ -50,6 +50,7 @@ SCRIPTS = (
     "panel.js",
     "map.js",
     "play.js",
+    "track.js",
     "main.js",
 )
 #: Recorded positions on each side of the pose, and rounding of coordinates relative to the robot's size.
@@ -68,6 +69,19 @@ _STATUSES = (
     "an optimum in another assembly mode than home",
     "optimum at the end of a joint range or of the home assembly mode",
 )
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Postures along a path.
+
+    Attributes:
+        x: (n,) variables at the first shown posture.
+        data: data of the script: postures, path, violations, and curves at each posture.
+    """
+
+    x: FloatArray
+    data: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,13 +139,16 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
     return LivePage(Template(_file("live.html.in")).substitute(texts, title=title), parts.fault, parts.size)
 
 
-def live_parts(source: ViewSource, solution: Solution | None, command: str) -> LiveParts:
+def live_parts(
+    source: ViewSource, solution: Solution | None, command: str, track: Track | None = None
+) -> LiveParts:
     """Return the pieces of the live view of a case.
 
     Args:
         source: C of the live view.
         solution: solution of the case; None for a case that is only evaluated.
         command: name of the case on the command line.
+        track: postures along a path, with which the page moves; None for none.
 
     Raises:
         InputError: the robot has no configuration at the shown point.
@@ -141,9 +158,12 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str) -> L
     module, fault = _module(source)
     data = view_data(source)
     answer = None if solution is None else _answer(solution)
-    start = starting_point(nlp)
+    start = starting_point(nlp) if track is None else track.x
     x = start if answer is None else np.array(answer["x"])
     drawing = _drawing(nlp, x)
+    if track is not None:
+        # The range of rotations is only that of the path.
+        data["rows"] = [each for each in data["rows"] if each["name"] != "angle"]
     page = {
         **data,
         "scene": _scene(drawing),
@@ -160,7 +180,8 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str) -> L
         "has_module": bool(module),
         "stated_tasks": _for_json(stated_tasks(case)),
         "prefixes": list(case.pose_prefixes),
-        "recorded": _recorded(nlp, x, is_needed=bool(fault) or not _has_free_turns(nlp)),
+        "track": None if track is None else track.data,
+        "recorded": _recorded(nlp, x, is_needed=track is None and (bool(fault) or not _has_free_turns(nlp))),
         "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
     return LiveParts(
@@ -332,6 +353,7 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
             tag("button", "Fit", type="button", id="view-fit"),
             tag("span", _legend(stated=stated), class_="extra") if stated else None,
         ),
+        tag("section", id="track", aria_label="Actuators at this point of the path"),
         id="picture",
     )
     return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])

@@ -7,6 +7,7 @@ import { Picture } from "./canvas.js";
 import { LimitBars, Sliders, TaskFields, byId, showValues } from "./panel.js";
 import { ValueMap } from "./map.js";
 import { Player } from "./play.js";
+import { Track } from "./track.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -53,10 +54,11 @@ const draw = () => {
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
   const p = state ? state.module.arrays.p : data.p;
   const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
-  const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
+  const twist = data.is_stated && !track ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
-  if (!picture.fitted.length) picture.fitted = extentOf(robot, data.scene, twist);
+  if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];
   const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist });
+  if (track) pieces.push(...track.pieces(axes, palette)), pieces.sort((a, b) => a.depth - b.depth);
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();
   for (const link of data.scene.links) {
@@ -75,6 +77,7 @@ const show = () => {
     fields?.refresh();
     showValues(state, bars?.refresh() ?? []);
     map?.refresh();
+    track?.refresh();
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
     byId("mode-evaluate").setAttribute("aria-pressed", String(isEvaluated));
@@ -91,6 +94,8 @@ let fields;
 let bars;
 /** @type {Player | undefined} */
 let player;
+/** @type {Track | undefined} */
+let track;
 /** @type {Map<any, () => void>} */
 const pending = new Map();
 /**
@@ -204,9 +209,13 @@ if (data.has_module) {
   map = new ValueMap(state, change);
   player = new Player(state, data, change);
   listen();
+  if (data.track) {
+    track = new Track(state, data.track, change, globalThis.document);
+    picture.grab = null;
+  }
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
-  Object.assign(globalThis, { screwsynth: { state, show, player, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
+  Object.assign(globalThis, { screwsynth: { state, show, player, track, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
   show();
 } else {
   player = new Player(null, data, change);
