@@ -139,9 +139,7 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
     return LivePage(Template(_file("live.html.in")).substitute(texts, title=title), parts.fault, parts.size)
 
 
-def live_parts(
-    source: ViewSource, solution: Solution | None, command: str, track: Track | None = None
-) -> LiveParts:
+def live_parts(source: ViewSource, solution: Solution | None, command: str, track: Track | None = None) -> LiveParts:
     """Return the pieces of the live view of a case.
 
     Args:
@@ -353,7 +351,6 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
             tag("button", "Fit", type="button", id="view-fit"),
             tag("span", _legend(stated=stated), class_="extra") if stated else None,
         ),
-        tag("section", id="track", aria_label="Actuators at this point of the path"),
         id="picture",
     )
     return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
@@ -432,7 +429,8 @@ def _values(data: ViewData) -> Markup:
         ),
     )
     limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    return tag("div", values, _actuators(data), limits, _map(), id="values", class_="needs-module")
+    track = tag("section", id="track", aria_label="Actuators at this point of the path")
+    return tag("div", track, values, _actuators(data), limits, _map(), id="values", class_="needs-module")
 
 
 def _map() -> Markup:

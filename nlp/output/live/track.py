@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -103,7 +102,11 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
             "limits": list(panel.limits),
             "most": _largest(panel.limits, [each.values for each in panel.curves]),
             "curves": [
-                {"name": each.name, "values": [_known(each.values[k]) for k in view.shown]} for each in panel.curves
+                {
+                    "name": f"{each.name} min" if each.is_other else each.name,
+                    "values": [_known(each.values[k]) for k in view.shown],
+                }
+                for each in panel.curves
             ],
         }
         for panel in picture.panels

@@ -118,7 +118,10 @@ def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Mar
     data = view.data
     words = data["frames"][data["first"]]["words"]
     options = [tag("option", "nearest limit", value="nearest"), tag("option", "margin", value="margin")]
-    colour = tag("label", "Colour of the path: ", for_="path-colour" if is_live else "colour"), tag("select", *options, id="path-colour" if is_live else "colour")
+    colour = (
+        tag("label", "Colour of the path: ", for_="path-colour" if is_live else "colour"),
+        tag("select", *options, id="path-colour" if is_live else "colour"),
+    )
     coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
     still = image_source(picture_file([view.drawing], ".svg"))
     if is_live:

@@ -211,7 +211,9 @@ if (data.has_module) {
   listen();
   if (data.track) {
     track = new Track(state, data.track, change, globalThis.document);
+    // The pose is that of the path, and the picture contains the path.
     picture.grab = null;
+    picture.fitted = [];
   }
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);

@@ -142,7 +142,7 @@ export class Track {
       for (const { element, fill, value, values } of rows) {
         const now = values[this.index];
         element.parentElement.hidden = !isCase;
-        value.textContent = now === null ? "?" : measured(now, "", 5);
+        value.textContent = now === null ? "unknown" : measured(now, "", 5);
         const part = now === null ? 0 : (50 * now) / panel.most;
         fill.style.left = `${Math.min(50, 50 + part).toFixed(2)}%`;
         fill.style.width = `${Math.abs(part).toFixed(2)}%`;
