@@ -123,7 +123,8 @@ def test_a_report_without_maps_has_no_plotly(cli: Run, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     assert cli("report", "reachy-mini", "--out", str(page), "--starts", "4")[0] in (0, 1)
     text = page.read_text(encoding="utf-8")
-    assert len(text) < 1_000_000
+    # The library of maps is larger than the whole page.
+    assert len(text) < 1_900_000
     assert '<script type="text/plain" id="plotly"></script>' in text
 
 

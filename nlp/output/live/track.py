@@ -1,4 +1,4 @@
-"""Live view along a tool path: the program's postures, curves and violations, with sliders of dimensions at each pose."""
+"""Live view along a tool path: recorded postures, curves and violations, with sliders of dimensions."""
 
 from __future__ import annotations
 
