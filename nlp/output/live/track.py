@@ -94,7 +94,7 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
         frames.append({"words": frame["words"], "at": frame["at"], "values": [float(each) for each in values]})
         if number == view.data["first"]:
             x[[*places, *inner]] = values
-    shown = {key: view.data[key] for key in ("limits", "path", "nearest", "margins", "most", "marks", "first")}  # type: ignore[literal-required]
+    shown = {key: view.data[key] for key in ("limits", "path", "nearest", "margins", "most", "marks", "first")}
     panels = [
         {
             "title": panel.title,
