@@ -67,7 +67,8 @@ export class Player {
     this.buttons = [...document.querySelectorAll("button[data-play]")].map((each) => /** @type {HTMLButtonElement} */ (each));
     this.buttons.forEach((button, task) => {
       button.hidden = !this.canFollow(task) && !this.recorded(task);
-      button.addEventListener("click", () => (this.task === task ? change(() => this.stop(), this) : change(() => this.start(task), this)));
+      // Not by the key of the steps: the next step of a motion would take the place of its end.
+      button.addEventListener("click", () => (this.task === task ? change(() => this.stop()) : change(() => this.start(task))));
     });
   }
 
