@@ -43,6 +43,14 @@ MOVE = """
 const range = root.getElementById("slider-0");
 range.value = arguments[0];
 range.dispatchEvent(new Event("input"));"""
+#: Waits until the platform has left a position.
+MOVED = """
+const [from, done] = arguments;
+const look = () => {
+  const { blocks } = screwsynth.state.data, { view } = screwsynth.state.module.arrays;
+  return from.some((each, k) => view[blocks.position[0] + k] !== each) ? done(true) : setTimeout(look, 20);
+};
+look();"""
 #: Position and rotation of the platform, and F.
 POSE = """
 const { state, player } = screwsynth, { blocks } = state.data, { view, F } = state.module.arrays;
@@ -154,9 +162,7 @@ def test_the_motion_of_a_task_is_its_screw_motion(
     chrome.execute_script("screwsynth.player.stop(); screwsynth.show()")
     # By hand: the robot moves, and a second press returns it.
     act(chrome, "root.querySelector('.play').click();")
-    start = "return new Promise((done) => setTimeout(() => done(true), 400))"
-    chrome.execute_script(start)
-    assert chrome.execute_script(POSE)[0] != position
+    chrome.execute_async_script(MOVED, position)
     act(chrome, "root.querySelector('.play').click();")
     assert chrome.execute_script(POSE)[:3] == [position, rotation, F]
     assert words(chrome, "word") == "optimal"

@@ -1,5 +1,6 @@
 // Bars of limits with editable values, and of actuator forces and speeds.
 import { digits, parsed, settled } from "./numbers.js";
+import { limitStatesOf } from "./limits.js";
 import { limitName } from "./names.js";
 import { byId, make, say } from "./panel.js";
 
@@ -18,7 +19,7 @@ export class LimitBars {
   }
 
   refresh() {
-    const states = this.state.limitStates();
+    const states = limitStatesOf(this.state.module, this.state.sides);
     for (const each of states) {
       if (!this.rows.has(each.key)) this.add(each);
       const { element, value, fill, mark, entry } = this.rows.get(each.key);
@@ -36,7 +37,7 @@ export class LimitBars {
     return states;
   }
 
-  /** @param {import("./state.js").LimitState} each */
+  /** @param {import("./limits.js").LimitState} each */
   add(each) {
     const { state } = this, value = make("output", { class: "value" });
     const fill = make("i", {}), mark = make("b", {}), bar = make("span", { class: "track" }, fill, mark);
@@ -60,8 +61,8 @@ export class LimitBars {
 
 /** Smallest limit on a force or speed of an actuator, in units of computations; NaN without one. @param {State} state @param {"actuator_force" | "actuator_speed"} kind @param {string} name */
 const limitOf = (state, kind, name) => {
-  const own = state.sides.filter((/** @type {any} */ { key, row }) => key.startsWith(kind) && `${row.name} `.includes(`actuator ${name} `));
-  const found = own.map((/** @type {any} */ { settable, stated }) => Math.abs(settable < 0 ? stated : state.module.arrays.limits[settable]));
+  const own = state.sides.filter(({ key, row }) => key.startsWith(kind) && `${row.name} `.includes(`actuator ${name} `));
+  const found = own.map(({ settable, stated }) => Math.abs(settable < 0 ? stated : state.module.arrays.limits[settable]));
   return found.length ? Math.min(...found) : NaN;
 };
 

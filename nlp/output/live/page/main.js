@@ -1,5 +1,6 @@
 // The live page: loads the module, and shows the state after each change.
 import { CaseModule } from "./module.js";
+import { measuredSide } from "./limits.js";
 import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
 import { axesOf, colourOf, conesOf, extentOf, piecesOf, robotOf } from "./scene.js";
@@ -55,10 +56,10 @@ const limbValues = (view) => {
 /** Half angle of a joint's cone, and whether its limit is violated there at the shown pose. @param {string} key @param {number} index */
 const coneLimit = (key, index) => {
   if (!state) return null;
-  const own = state.sides.filter((/** @type {any} */ each) => each.key === key), count = own.length / data.poses;
+  const own = state.sides.filter((each) => each.key === key), count = own.length / data.poses;
   const side = own[state.pose * count + index];
   if (!side) return null;
-  const { limit, margin } = state.measure(side);
+  const { limit, margin } = measuredSide(state.module, side);
   return { limit, isViolated: margin < -1e-6 };
 };
 
