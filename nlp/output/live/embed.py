@@ -54,10 +54,13 @@ def live_view_of(solution: Solution, command: str) -> LiveView:
         command: name of the case on the command line.
     """
     case = solution.chosen_case
+    if case.changes:
+        fault = "a live view shows one robot for all tasks, and this one changes from task to task"
+        return LiveView(tag("p", f"This page has no sliders: {fault}.", class_="note"), is_live=False)
     try:
         source = view_source(case)
     except CaseError as error:
-        source = view_without_solver(case, str(error))
+        source = view_without_solver(case, error)
     try:
         return embedded(live_parts(source, solution, command))
     except InputError as error:
