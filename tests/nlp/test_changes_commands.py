@@ -50,7 +50,7 @@ def test_every_task_is_evaluated_at_its_settings(file: str, tmp_path: Path, cli:
     assert pytest.approx(wanted[0], rel=1e-12) == evaluate(read(PINS, **{"x1.task1": 6.5})).F
 
 
-def test_a_violated_limit_of_one_task_fails_the_evaluation(file: str, tmp_path: Path, cli: Run) -> None:
+def test_a_violated_limit_of_one_task_fails_the_evaluation(tmp_path: Path, cli: Run) -> None:
     limited = tmp_path / "limited.toml"
     limited.write_text(f"{PINS}\n[limits]\nleg_length = {{ max = 40.5 }}\n")
     status, words, _ = cli("evaluate", str(limited), "--set", "x1.task1=6", "--set", "x1.task2=12")
