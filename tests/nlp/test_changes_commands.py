@@ -81,14 +81,15 @@ def test_results_with_settings_need_the_tasks_of_the_case(file: str, tmp_path: P
     assert "has a robot for each of 2 tasks, but 'shared' has one robot for all tasks; set the values" in fault
     # A result with one robot gives every task this robot.
     output_of(cli("evaluate", str(shared), "--set", "x1=9", "--json", str(solved)))
-    words = output_of(cli("evaluate", file, "--of", str(solved)))
+    status, words, notice = cli("evaluate", file, "--of", str(solved))
+    assert (status, "gives the dimensions of the case 'shared'" in notice) == (0, True)
     assert "x1.task1   9" in words
     assert "x1.task2   9" in words
 
 
 def test_a_row_of_a_sweep_is_a_solve_at_its_point(file: str, tmp_path: Path, cli: Run) -> None:
     out = tmp_path / "rows.csv"
-    output_of(cli("sweep", file, "--over", "x1.task2.max=8,9", "--out", str(out)))
+    assert cli("sweep", file, "--over", "x1.task2.max=8,9", "--out", str(out))[0] == 0
     with out.open() as lines:
         rows = list(csv.DictReader(lines))
     for row, most in zip(rows, (8.0, 9.0), strict=True):
