@@ -88,7 +88,7 @@ def _written(folder: Path, *changes: tuple[str, str], count: int = 0, lean: floa
 
 _STRUT = (
     (
-        '[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"                     # the direction of the feed at each point\n',
+        f'[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"{" " * 21}# the direction of the feed at each point\n',
         "",
     ),
     ('as = "mean"', 'as = "worst"\nminimise = "leg_length"'),
@@ -285,7 +285,8 @@ _PER_PATH = ("x3 = 0", 'x3 = { min = 0, max = 30, per = "path", rate = 2 }')
     [
         ([("x3 = 0", 'x3 = { min = 0, max = 30, per = "path" }')],
          "robot.parameters.x3.rate: is missing: a number that changes along the path needs its largest rate, or inf"),
-        ([("x3 = 0", "x3 = { min = 0, max = 30, rate = 2 }")], 'robot.parameters.x3.rate: has an effect only with per = "path"'),
+        ([("x3 = 0", "x3 = { min = 0, max = 30, rate = 2 }")],
+         'robot.parameters.x3.rate: has an effect only with per = "path"'),
         ([("rate = 5", "rate = 0")], "path.tool.turn.rate = 0.0: must be positive, or inf for no limit"),
         ([("rate = 5", "rate = -5")], "path.tool.turn.rate = -5.0: must be positive, or inf for no limit"),
         ([("rate = 5", "rate = nan")], "path.tool.turn.rate = nan: must be positive, or inf for no limit"),
@@ -293,7 +294,8 @@ _PER_PATH = ("x3 = 0", 'x3 = { min = 0, max = 30, per = "path", rate = 2 }')
          "path.tool.turn.rate: is missing: a number that changes along the path needs its largest rate, or inf"),
         ([('as = "mean"', 'as = "mean"\nminimise = "leg_length"')],
          'objective.minimise = "leg_length": needs over = "path" and as = "worst"'),
-        ([('follows = "feed"', 'follows = "feed"\npitch = 0')], "task[0].pitch: conflicts with follows; state the motion in one way"),
+        ([('follows = "feed"', 'follows = "feed"\npitch = 0')],
+         "task[0].pitch: conflicts with follows; state the motion in one way"),
         ([('follows = "feed"', 'follows = "thrust"'), ("tool = {", "#")], "needs path.tool with the tool's axis"),
         ([("leg_length = {", 'over = "path"\nleg_length = {')], "limits.over = \"path\": conflicts with objective.as"),
         ([("position = [9,", "position = [{ min = 8, max = 9 },")], "pose: must be fixed with objective.as"),
