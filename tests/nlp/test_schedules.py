@@ -86,9 +86,11 @@ def _written(folder: Path, *changes: tuple[str, str], count: int = 0, lean: floa
     return file
 
 
+#: First lines of the task of the shipped case.
+_TASK_LINES = '[[task]]\nname = "feed"\nsense = "max"\n'
 _STRUT = (
     (
-        f'[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"{" " * 21}# the direction of the feed at each point\n',
+        _TASK_LINES + f'follows = "feed"{" " * 21}# the direction of the feed at each point\n',
         "",
     ),
     ('as = "mean"', 'as = "worst"\nminimise = "leg_length"'),
