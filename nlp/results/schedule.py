@@ -1,5 +1,7 @@
 """Schedule of a solve as JSON: values that change along the path, the best constant, and the bound of all schedules."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..case.pose import OverPoses
@@ -58,7 +60,7 @@ class ScheduleData(JsonObject):
     over: OverPoses
     value: float
     segments: int
-    design: dict[str, float]
+    design: Mapping[str, float]
     constant: ConstantSettingData | None
     rates: tuple[RateData, ...]
     times: Absent[Vector]
