@@ -1,6 +1,6 @@
 """Schedule of a turn about the tool: dynamic programming with Ipopt, beside Ipopt from constant settings alone.
 
-    python -P bench/schedule.py [CASE]
+python -P bench/schedule.py [CASE]
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         over=schedule.over,
         value=schedule.value,
         segments=len(schedule.values) - 1,
-        design=dict(schedule.design),
+        design=schedule.design,
         constant=None
         if constant is None
         else ConstantSettingData(values=vector(constant.values), value=constant.value, gain=schedule.gain or 0.0),
