@@ -65,7 +65,8 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         _override_turn(tool, name, value)
         return
     _separate_tasks(tables, name)
-    _override_place_of_case(tables, name, value)
+    if not override_setting(tables, name, value):
+        _override_place_of_case(tables, name, value)
 
 
 def _tool_of(tables: Mapping[str, Any], name: str) -> dict[str, Any] | None:
