@@ -11,6 +11,7 @@ from ...models import component_names
 from ..errors import CaseError, nearest
 from .names import name_of_task, parameter_name, pose_prefixes
 from .pathfile import TURN
+from .posesettings import override_setting
 
 #: New values by name, in the units of the case file: a number, or three for a point, axis or direction.
 Settings: TypeAlias = Mapping[str, float | list[float]]
