@@ -87,7 +87,10 @@ def _written(folder: Path, *changes: tuple[str, str], count: int = 0, lean: floa
 
 
 _STRUT = (
-    ('[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"                     # the direction of the feed at each point\n', ""),
+    (
+        '[[task]]\nname = "feed"\nsense = "max"\nfollows = "feed"                     # the direction of the feed at each point\n',
+        "",
+    ),
     ('as = "mean"', 'as = "worst"\nminimise = "leg_length"'),
 )
 
@@ -103,7 +106,7 @@ def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
     assert schedule is not None and schedule.constant is not None and schedule.bound is not None
     assert solution.status.value == "locally optimal"
     assert schedule.value == pytest.approx(1.6913299, abs=2e-7)
-    assert solution.F == schedule.value
+    assert schedule.value == solution.F
     assert schedule.constant.value == pytest.approx(1.657882, abs=1e-6)
     assert schedule.constant.values[0] == pytest.approx(-0.7011, abs=1e-3)
     assert schedule.gain == pytest.approx(0.02017, abs=1e-4)
@@ -118,7 +121,9 @@ def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
     assert np.mean(F) == pytest.approx(schedule.value, abs=1e-9)
     np.testing.assert_allclose(schedule.F, F, atol=1e-9)
     assert F[57] == pytest.approx(1.7382456, abs=2e-3)
-    lengths = np.array([np.linalg.norm(_struts(a, p, s), axis=1) for a, p, s in zip(angles, positions, turns, strict=True)])
+    lengths = np.array(
+        [np.linalg.norm(_struts(a, p, s), axis=1) for a, p, s in zip(angles, positions, turns, strict=True)]
+    )
     assert lengths.min() >= 17 * (1 - 1e-9) and lengths.max() <= 43 * (1 + 1e-9)
     steps = np.abs(np.diff(schedule.values[:, 0]))
     assert (steps <= 5 * np.diff(schedule.times)).all()
@@ -310,7 +315,9 @@ def _refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 def test_commands_refuse_what_they_cannot_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     two = str(_written(tmp_path, _PER_PATH))
-    assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(capsys, "solve", two, "--certify")
+    assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(
+        capsys, "solve", two, "--certify"
+    )
     assert "turn changes along the path, but this command takes one robot" in _refusal(capsys, "evaluate", str(_YAW))
     assert "--round: is for designs at stated poses" in _refusal(capsys, "solve", str(_YAW), "--round", "1")
     schedule = ("solve", "paper-4.1-helical", "--schedule", str(tmp_path / "none.csv"))
@@ -325,7 +332,9 @@ def test_path_of_one_point_and_path_without_times_are_refused(
     (tmp_path / "hexapod-yaw.csv").write_text("t,x,y,z\n0,9,3,20\n")
     assert "fewer than two points" in _refusal(capsys, "solve", str(file))
     (tmp_path / "hexapod-yaw.csv").write_text("x,y,z\n9,3,20\n4,8,20\n")
-    assert "turn.rate: needs the time of every segment, which the path does not state" in _refusal(capsys, "solve", str(file))
+    assert "turn.rate: needs the time of every segment, which the path does not state" in _refusal(
+        capsys, "solve", str(file)
+    )
 
 
 def test_picture_has_the_schedule_and_the_constant(tmp_path: Path) -> None:
