@@ -60,10 +60,25 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     if _TASK.fullmatch(name):
         _override_task(tables, name, value)
         return
-    if name.partition(".")[0] == TURN and isinstance(tables.get("path"), dict) and "tool" in tables["path"]:
-        _override_turn(tables["path"]["tool"], name, value)
+    tool = _tool_of(tables, name)
+    if tool is not None:
+        _override_turn(tool, name, value)
         return
     _separate_tasks(tables, name)
+    _override_place_of_case(tables, name, value)
+
+
+def _tool_of(tables: Mapping[str, Any], name: str) -> dict[str, Any] | None:
+    """Return the table of the tool if a name is that of the turn about it; otherwise None."""
+    path = tables.get("path")
+    if name.partition(".")[0] != TURN or not isinstance(path, dict) or not isinstance(path.get("tool"), dict):
+        return None
+    found: dict[str, Any] = path["tool"]
+    return found
+
+
+def _override_place_of_case(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace a parameter of the robot or a coordinate of a pose; see :func:`override_number`."""
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
     if end in (*ENDS, RATE) and whole in places:

@@ -11,12 +11,13 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from builders import Run
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import CaseError, load_case, solve
 from screwsynth.nlp.case.case import Case
 from screwsynth.nlp.case.pose import Free, OverPoses
-from screwsynth.nlp.cli.main import main
+from screwsynth.nlp.output.pictures.schedules import schedule_figure
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.schedule.cells import cell_bound
 from screwsynth.nlp.solver.schedule.dynamic import Grid, best_path, seeds, sliding_maximum
@@ -27,10 +28,9 @@ _DEGREE = math.pi / 180
 _YAW = Path("cases/hexapod-yaw.toml").resolve()
 
 
-def _circle(count: int, lean: float = 30.0) -> tuple[FloatArray, FloatArray]:
+def _circle(count: int) -> tuple[FloatArray, FloatArray]:
     """Return the angles (N,) of points of the circle, and their positions (N, 3), inches."""
     angles = np.linspace(0, 2 * np.pi, count)
-    del lean
     return angles, np.stack([4 + 5 * np.cos(angles), 3 + 5 * np.sin(angles), np.full(count, 20.0)], axis=1)
 
 
@@ -51,7 +51,7 @@ def _struts(angle: float, position: FloatArray, turn: float, lean: float = 30.0)
     return np.asarray(position + platform @ R.T - base)
 
 
-def _F(angle: float, position: FloatArray, turn: float) -> float:
+def _objective(angle: float, position: FloatArray, turn: float) -> float:
     """Return F of the feed direction: the sum of the squared components of the struts' unit vectors along it."""
     struts = _struts(angle, position, turn)
     feed = np.array([-np.sin(angle), np.cos(angle), 0.0])
@@ -103,7 +103,9 @@ def yaw() -> Case:
 def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
     solution = solve(yaw, gap=5e-4)
     schedule = solution.schedule
-    assert schedule is not None and schedule.constant is not None and schedule.bound is not None
+    assert schedule is not None
+    assert schedule.constant is not None
+    assert schedule.bound is not None
     assert solution.status.value == "locally optimal"
     assert schedule.value == pytest.approx(1.6913299, abs=2e-7)
     assert schedule.value == solution.F
@@ -112,19 +114,21 @@ def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
     assert schedule.gain == pytest.approx(0.02017, abs=1e-4)
     # A bound below a schedule would be a false proof; the gap is what was asked for.
     assert 1.691329 < schedule.value <= schedule.bound <= 1.6925
-    assert schedule.gap is not None and schedule.gap <= 5e-4
+    assert schedule.gap is not None
+    assert schedule.gap <= 5e-4
     assert schedule.names == ("turn",)
     # Objective and limits again, by kinematics of this file.
     angles, positions = _circle(200)
     turns = schedule.values[:, 0] * _DEGREE
-    F = [_F(a, p, s) for a, p, s in zip(angles, positions, turns, strict=True)]
+    F = [_objective(a, p, s) for a, p, s in zip(angles, positions, turns, strict=True)]
     assert np.mean(F) == pytest.approx(schedule.value, abs=1e-9)
     np.testing.assert_allclose(schedule.F, F, atol=1e-9)
-    assert F[57] == pytest.approx(1.7382456, abs=2e-3)
+    assert F[57] == pytest.approx(1.7382456, abs=1e-6)
     lengths = np.array(
         [np.linalg.norm(_struts(a, p, s), axis=1) for a, p, s in zip(angles, positions, turns, strict=True)]
     )
-    assert lengths.min() >= 17 * (1 - 1e-9) and lengths.max() <= 43 * (1 + 1e-9)
+    assert lengths.min() >= 17 * (1 - 1e-9)
+    assert lengths.max() <= 43 * (1 + 1e-9)
     steps = np.abs(np.diff(schedule.values[:, 0]))
     assert (steps <= 5 * np.diff(schedule.times)).all()
     assert np.abs(schedule.values).max() <= 75
@@ -133,21 +137,21 @@ def test_shipped_case_reaches_the_known_schedule(yaw: Case) -> None:
 def test_ipopt_alone_stays_on_another_ridge(yaw: Case) -> None:
     problem = schedule_problem(yaw)
     found = polish(problem, np.zeros(0), np.zeros((200, 1)), near=False)
-    assert found is not None and found.value == pytest.approx(1.670501, abs=1e-5)
+    assert found is not None
+    assert found.value == pytest.approx(1.670501, abs=1e-5)
 
 
-def test_worst_value_has_no_gain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = _written(tmp_path, ('as = "mean"', 'as = "worst"'))
-    with pytest.raises(SystemExit) as end:
-        main(["solve", str(file)])
-    assert end.value.code == 0
-    assert "worst F = 1.375807 along 199 segments (best constant turn 1.375807, no gain)" in capsys.readouterr().out
+def test_worst_value_has_no_gain(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("solve", str(_written(tmp_path, ('as = "mean"', 'as = "worst"'))))
+    assert code == 0
+    assert "worst F = 1.375807 along 199 segments (best constant turn 1.375807, no gain)" in " ".join(out.split())
 
 
 def test_longest_strut(tmp_path: Path) -> None:
     file = _written(tmp_path, *_STRUT, ("max = 43", "max = 60"), count=200, lean=40)
     schedule = solve(load_case(str(file))).schedule
-    assert schedule is not None and schedule.constant is not None
+    assert schedule is not None
+    assert schedule.constant is not None
     assert schedule.value == pytest.approx(40.79375, abs=1e-4)
     assert schedule.constant.value == pytest.approx(41.3713, abs=1e-3)
     angles, positions = _circle(200)
@@ -159,26 +163,27 @@ def test_longest_strut(tmp_path: Path) -> None:
     assert schedule.F.max() == pytest.approx(longest, abs=1e-8)
 
 
-def test_longest_strut_below_the_least_is_infeasible(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = _written(tmp_path, *_STRUT, ("max = 43", "max = 40.6"), count=200, lean=40)
-    with pytest.raises(SystemExit) as end:
-        main(["solve", str(file)])
-    assert end.value.code == 1
-    assert "infeasible: no schedule of turn within the limits and rates was found" in capsys.readouterr().out
+def test_longest_strut_below_the_least_is_infeasible(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("solve", str(_written(tmp_path, *_STRUT, ("max = 43", "max = 40.6"), count=200, lean=40)))
+    assert code == 1
+    assert "infeasible: no schedule of turn within the limits and rates was found" in out
 
 
 def test_a_finer_path_has_nearly_the_same_mean(tmp_path: Path) -> None:
     schedule = solve(load_case(str(_written(tmp_path, count=1000)))).schedule
-    assert schedule is not None and schedule.value == pytest.approx(1.692791, abs=2e-6)
+    assert schedule is not None
+    assert schedule.value == pytest.approx(1.692791, abs=2e-6)
 
 
 def test_a_closed_contour_ends_as_it_begins(tmp_path: Path) -> None:
     file = _written(tmp_path, ("tool = {", "periodic = true\ntool = {"), count=60)
     periodic, free = solve(load_case(str(file))).schedule, solve(load_case(str(_written(tmp_path, count=60)))).schedule
-    assert periodic is not None and free is not None
+    assert periodic is not None
+    assert free is not None
     assert periodic.values[0, 0] == pytest.approx(periodic.values[-1, 0], abs=1e-6)
     assert periodic.value <= free.value + 1e-9
-    assert periodic.gain is not None and periodic.gain >= 0
+    assert periodic.gain is not None
+    assert periodic.gain >= 0
 
 
 def test_dynamic_programming_equals_exhaustive_search() -> None:
@@ -223,7 +228,7 @@ def test_bound_is_never_below_a_sampled_schedule(tmp_path: Path, seed: int) -> N
     d = np.zeros(0)
     best = -math.inf
     limits = problem.steps[:, 0]
-    for _ in range(4000):
+    for _ in range(400):
         s = np.empty((len(problem.points), 1))
         s[0] = rng.uniform(-75, 75) * _DEGREE
         for i, step in enumerate(limits):
@@ -232,18 +237,18 @@ def test_bound_is_never_below_a_sampled_schedule(tmp_path: Path, seed: int) -> N
         if (values.excess <= 0).all():
             best = max(best, problem.value(d, s))
     assert math.isfinite(best)
-    # Each bound holds for any known schedule, also for a poor one.
-    for known in (best, best - 0.05 * abs(best)):
-        assert cell_bound(problem, d, known, 1e-3).bound >= best
     polished = [polish(problem, d, s) for s in seeds(problem, d, np.zeros(1))]
-    assert max(each.value for each in polished if each is not None) <= cell_bound(problem, d, best, 1e-4).bound
+    known = max(each.value for each in polished if each is not None)
+    assert known >= best
+    # The bound holds also if only a poorer schedule is known.
+    assert cell_bound(problem, d, best - 0.05 * abs(best), 0.1).bound >= known
+    assert cell_bound(problem, d, best, 0.05).bound >= known
 
 
-def test_written_schedule_keeps_rates_and_limits(tmp_path: Path) -> None:
+def test_written_schedule_keeps_rates_and_limits(tmp_path: Path, cli: Run) -> None:
     target, result = tmp_path / "s.csv", tmp_path / "r.json"
-    with pytest.raises(SystemExit) as end:
-        main(["solve", str(_written(tmp_path, count=40)), "--schedule", str(target), "--json", str(result)])
-    assert end.value.code == 0
+    code, _, _ = cli("solve", str(_written(tmp_path, count=40)), "--schedule", str(target), "--json", str(result))
+    assert code == 0
     with target.open() as text:
         rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(text)]
     assert list(rows[0]) == ["x", "y", "z", "qw", "qx", "qy", "qz", "turn", "t"]
@@ -251,9 +256,10 @@ def test_written_schedule_keeps_rates_and_limits(tmp_path: Path) -> None:
         assert abs(other["turn"] - one["turn"]) <= 5 * (other["t"] - one["t"])
     assert all(-75 <= row["turn"] <= 75 for row in rows)
     data = json.loads(result.read_text())
-    jsonschema.validate(data, result_schema("solve"))
+    jsonschema.validate(data, result_schema())
     assert data["status"] == "locally optimal"
-    assert data["schedule"]["names"] == ["turn"] and len(data["schedule"]["rows"]) == 40
+    assert data["schedule"]["names"] == ["turn"]
+    assert len(data["schedule"]["rows"]) == len(rows)
     assert data["schedule"]["rates"][0]["used"] <= data["schedule"]["rates"][0]["max"] * (1 + 1e-12)
 
 
@@ -261,8 +267,10 @@ def test_case_is_read_again_from_its_text(yaw: Case, tmp_path: Path) -> None:
     text = yaw.to_toml()
     (tmp_path / "again.toml").write_text(text)
     again = load_case(str(tmp_path / "again.toml"))
-    assert again.settings == yaw.settings and again.over_path is OverPoses.MEAN
-    assert again.tasks[0].follows == "feed" and again.to_toml() == text
+    assert again.settings == yaw.settings
+    assert again.over_path is OverPoses.MEAN
+    assert again.tasks[0].follows == "feed"
+    assert again.to_toml() == text
     moving = load_case(str(_written(tmp_path, ("x3 = 0", 'x3 = { min = 0, max = 9, per = "path", rate = 2 }'))))
     assert moving.settings["x3"] == Free(0.0, 9 * _DEGREE, rate=2 * _DEGREE)
     assert 'per = "path"' in moving.to_toml()
@@ -283,7 +291,7 @@ _PER_PATH = ("x3 = 0", 'x3 = { min = 0, max = 30, per = "path", rate = 2 }')
         ([("rate = 5", "rate = nan")], "path.tool.turn.rate = nan: must be positive, or inf for no limit"),
         ([(", rate = 5", "")],
          "path.tool.turn.rate: is missing: a number that changes along the path needs its largest rate, or inf"),
-        ([('over = "path"\nas = "mean"', 'minimise = "leg_length"')],
+        ([('as = "mean"', 'as = "mean"\nminimise = "leg_length"')],
          'objective.minimise = "leg_length": needs over = "path" and as = "worst"'),
         ([('follows = "feed"', 'follows = "feed"\npitch = 0')], "task[0].pitch: conflicts with follows; state the motion in one way"),
         ([('follows = "feed"', 'follows = "thrust"'), ("tool = {", "#")], "needs path.tool with the tool's axis"),
@@ -302,44 +310,40 @@ def test_bad_cases_are_refused(tmp_path: Path, changes: list[tuple[str, str]], w
 def test_change_along_a_missing_path_is_refused(tmp_path: Path) -> None:
     text = _written(tmp_path, _PER_PATH).read_text()
     (tmp_path / "case.toml").write_text(text[: text.index("[path]")])
-    with pytest.raises(CaseError, match='robot.parameters.x3.per = "path": the case states no path'):
+    with pytest.raises(CaseError, match=r'robot\.parameters\.x3\.per = "path": the case states no path'):
         load_case(str(tmp_path / "case.toml"))
 
 
-def _refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    with pytest.raises(SystemExit) as end:
-        main(list(arguments))
-    assert end.value.code == 2
-    return " ".join(capsys.readouterr().err.split())
+def _refusal(cli: Run, *arguments: str) -> str:
+    code, out, err = cli(*arguments)
+    assert (code, out) == (2, "")
+    return " ".join(err.split())
 
 
-def test_commands_refuse_what_they_cannot_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_refuse_what_they_cannot_do(tmp_path: Path, cli: Run) -> None:
     two = str(_written(tmp_path, _PER_PATH))
     assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(
-        capsys, "solve", two, "--certify"
+        cli, "solve", two, "--certify"
     )
-    assert "turn changes along the path, but this command takes one robot" in _refusal(capsys, "evaluate", str(_YAW))
-    assert "--round: is for designs at stated poses" in _refusal(capsys, "solve", str(_YAW), "--round", "1")
+    assert "turn changes along the path, but this command takes one robot" in _refusal(cli, "evaluate", str(_YAW))
+    free = str(_written(tmp_path, ("x1 = 26.5", "x1 = { min = 20, max = 30 }")))
+    assert "--round: is for designs at stated poses" in _refusal(cli, "solve", free, "--round", "1")
     schedule = ("solve", "paper-4.1-helical", "--schedule", str(tmp_path / "none.csv"))
-    assert "--schedule: the case optimises nothing along a path" in _refusal(capsys, *schedule)
+    assert "--schedule: the case optimises nothing along a path" in _refusal(cli, *schedule)
     assert not (tmp_path / "none.csv").exists()
 
 
-def test_path_of_one_point_and_path_without_times_are_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_path_of_one_point_and_path_without_times_are_refused(tmp_path: Path, cli: Run) -> None:
     file = _written(tmp_path)
     (tmp_path / "hexapod-yaw.csv").write_text("t,x,y,z\n0,9,3,20\n")
-    assert "fewer than two points" in _refusal(capsys, "solve", str(file))
+    assert "fewer than two points" in _refusal(cli, "solve", str(file))
     (tmp_path / "hexapod-yaw.csv").write_text("x,y,z\n9,3,20\n4,8,20\n")
     assert "turn.rate: needs the time of every segment, which the path does not state" in _refusal(
-        capsys, "solve", str(file)
+        cli, "solve", str(file)
     )
 
 
 def test_picture_has_the_schedule_and_the_constant(tmp_path: Path) -> None:
-    from screwsynth.nlp.output.pictures.schedules import schedule_figure
-
     case = load_case(str(_written(tmp_path, count=30)))
     figure = schedule_figure(case, solve(case))
     assert figure is not None
