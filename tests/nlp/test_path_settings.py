@@ -355,7 +355,8 @@ def test_a_fixed_turn_is_part_of_every_path() -> None:
             assert extreme(one, name, sense).bound == pytest.approx(extreme(two, name, sense).bound, abs=1e-5)
 
 
-def test_a_schedule_that_is_violated_between_its_points_is_solved_again() -> None:
+def test_a_schedule_that_is_violated_between_its_points_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2] / "cases")
     case = case_of("hexapod-yaw")
     assert case.path is not None
     problem = schedule_problem(replace(case, path=replace(case.path, has_limits=True)))
