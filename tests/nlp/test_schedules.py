@@ -299,7 +299,6 @@ _PER_PATH = ("x3 = 0", 'x3 = { min = 0, max = 30, per = "path", rate = 2 }')
         ([('follows = "feed"', 'follows = "feed"\npitch = 0')],
          "task[0].pitch: conflicts with follows; state the motion in one way"),
         ([('follows = "feed"', 'follows = "thrust"'), ("tool = {", "#")], "needs path.tool with the tool's axis"),
-        ([("leg_length = {", 'over = "path"\nleg_length = {')], "limits.over = \"path\": conflicts with objective.as"),
         ([("position = [9,", "position = [{ min = 8, max = 9 },")], "pose: must be fixed with objective.as"),
         ([('as = "mean"', 'as = "median"')], "objective.as"),
         ([("axis = [0, 0, 1], turn", "axis = [0, 0, 0], turn")], "path.tool.axis = [0.0, 0.0, 0.0]: must not be zero"),
