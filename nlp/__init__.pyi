@@ -30,6 +30,7 @@ from .case.loads import Load as Load
 from .case.loads import Loading as Loading
 from .case.loads import Motion as Motion
 from .case.pathfile import PathFile as PathFile
+from .case.pathfile import Tool as Tool
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
 from .case.pose import PerTask as PerTask

@@ -52,11 +52,35 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
     Raises:
         CaseError: the case has no value with this name.
     """
-    if _override_elsewhere(tables, name, value):
+    if name.startswith(_LIMITS):
+        _override_limit(tables, name, value)
+        return
+    if name.startswith(_PLACE):
+        _override_place(tables, name, value)
+        return
+    if _TASK.fullmatch(name):
+        _override_task(tables, name, value)
+        return
+    tool = _tool_of(tables, name)
+    if tool is not None:
+        _override_turn(tool, name, value)
         return
     _separate_tasks(tables, name)
-    if override_setting(tables, name, value):
-        return
+    if not override_setting(tables, name, value):
+        _override_place_of_case(tables, name, value)
+
+
+def _tool_of(tables: Mapping[str, Any], name: str) -> dict[str, Any] | None:
+    """Return the table of the tool if a name is that of the turn about it; otherwise None."""
+    path = tables.get("path")
+    if name.partition(".")[0] != TURN or not isinstance(path, dict) or not isinstance(path.get("tool"), dict):
+        return None
+    found: dict[str, Any] = path["tool"]
+    return found
+
+
+def _override_place_of_case(tables: dict[str, Any], name: str, value: float | list[float]) -> None:
+    """Replace a parameter of the robot or a coordinate of a pose; see :func:`override_number`."""
     places, rotations = _places(tables, name)
     whole, _, end = name.rpartition(".")
     if end in (*ENDS, RATE) and whole in places:
@@ -75,21 +99,6 @@ def override_number(tables: dict[str, Any], name: str, value: float | list[float
         raise CaseError(name, f"cannot be set; {_allowed(name, tables, places, rotations)}")
     table, place = places[name]
     table[place] = value
-
-
-def _override_elsewhere(tables: dict[str, Any], name: str, value: float | list[float]) -> bool:
-    """Replace a value of limits, path or tasks; return whether it is one. Errors are those of the other function."""
-    if name.startswith(_LIMITS):
-        _override_limit(tables, name, value)
-    elif name.startswith(_PLACE):
-        _override_place(tables, name, value)
-    elif _TASK.fullmatch(name):
-        _override_task(tables, name, value)
-    elif name.partition(".")[0] == TURN and isinstance(tables.get("path"), dict) and "tool" in tables["path"]:
-        _override_turn(tables["path"]["tool"], name, value)
-    else:
-        return False
-    return True
 
 
 def fields_of(name: str) -> tuple[str, ...]:

@@ -133,7 +133,7 @@ def _lines(case: Case) -> Iterator[str]:
             yield from toml_table("[[task]]", _task(task))
         over = case.limits_over if case.worst_everywhere else None
         along = None if case.over_path is None else case.over_path.value
-        over = over or (along and "path")
+        over = "path" if along else over
         yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over, "as": along})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)

@@ -129,7 +129,9 @@ def path(
         own = settings_at(judged, claim)
         shown = loaded.replace(own) if own else loaded
         further = [] if own else further
-        return evaluate_command(case, shown, chosen | own, pose, RotationForm.RPY, claim=claim.name, further=further)
+        return evaluate_command(
+            case, shown, {**chosen, **own}, pose, RotationForm.RPY, claim=claim.name, further=further
+        )
 
     @cache
     def picture() -> contents.PathPicture:

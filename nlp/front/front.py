@@ -163,7 +163,10 @@ def _spread_between(
                 break
             closed.add((id(found[pair]), id(found[pair + 1])))
             continue
-        found = _undominated([*found, middle], builder.goals, size)
+        kept = _undominated([*found, middle], builder.goals, size)
+        if not any(each is middle for each in kept):  # a search again would find the same dominated point
+            closed.add((id(found[pair]), id(found[pair + 1])))
+        found = kept
     found = _undominated(found, builder.goals, size)
     return found, [k for k in range(len(found) - 1) if (id(found[k]), id(found[k + 1])) in closed]
 

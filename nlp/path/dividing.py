@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +12,9 @@ from .options import Between
 from .orientation import quaternions_from_angles, roll_pitch_yaw, shortest_turns, turned
 from .path import Kind, ProgrammedPath
 from .sampling import Points
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 def divided_path(path: ProgrammedPath, points: Points) -> ProgrammedPath:
@@ -42,9 +46,9 @@ def divided_path(path: ProgrammedPath, points: Points) -> ProgrammedPath:
     )
 
 
-def _knots(path: ProgrammedPath, segments: FloatArray, s: FloatArray) -> FloatArray:
+def _knots(path: ProgrammedPath, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
     """Return positions and angles (k, 6) at points of segments, in the path's frame."""
-    k = segments.astype(int)
+    k = segments
     start, finish = path.knots[k], path.knots[k + 1]
     found = start + s[:, None] * (finish - start)
     inside = np.flatnonzero(s > 0)
@@ -54,4 +58,4 @@ def _knots(path: ProgrammedPath, segments: FloatArray, s: FloatArray) -> FloatAr
         first, last = (quaternions_from_angles(each[inside, 3:], path.order) for each in (start, finish))
         axes, angles = shortest_turns(first, last)
         found[inside, 3:] = roll_pitch_yaw(turned(first, axes, s[inside] * angles))
-    return found
+    return np.asarray(found)

@@ -153,12 +153,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         raise CaseError(
             key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
         )
-    if case.over_path is not None:
-        name = next(iter(case.settings), None)
-        fault = "optimises along the path, but this command takes one pose; use solve"
-        if name is not None:
-            fault = f"{name} changes along the path, but this command takes one robot; use solve, or fix it with --set {name}"
-        raise CaseError("objective.as", fault, case.over_path.value, source=case.source)
+    _refuse_over_path(case)
     table, model = SymbolTable(), case.model
     owners = _Owners(table)
     parameters = [_add_parameter(case, item, owners) for item in model.parameters]
@@ -252,6 +247,21 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         (*following, *fixed),
         limits.fixed_families,
     )
+
+
+def _refuse_over_path(case: Case) -> None:
+    """Refuse a case that is optimised along its path: it has no pose of its own.
+
+    Raises:
+        CaseError: the case is optimised along its path.
+    """
+    if case.over_path is None:
+        return
+    fault = "optimises along the path, but this command takes one pose; use solve"
+    if case.settings:
+        name = next(iter(case.settings))
+        fault = f"{name} changes along the path, but this command takes one robot; use solve"
+    raise CaseError("objective.as", fault, case.over_path.value, source=case.source)
 
 
 class _Parameter(NamedTuple):

@@ -1,5 +1,7 @@
 """Schedule of a solve as JSON: values that change along the path, the best constant, and the bound of all schedules."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..case.pose import OverPoses
@@ -62,7 +64,7 @@ class ScheduleData(JsonObject):
     over: OverPoses
     value: float
     segments: int
-    design: dict[str, float]
+    design: Mapping[str, float]
     constant: ConstantSettingData | None
     rates: tuple[RateData, ...]
     times: Absent[Vector]
@@ -85,7 +87,7 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         over=schedule.over,
         value=schedule.value,
         segments=len(schedule.values) - 1,
-        design=dict(schedule.design),
+        design=schedule.design,
         constant=None
         if constant is None
         else ConstantSettingData(values=vector(constant.values), value=constant.value, gain=schedule.gain or 0.0),

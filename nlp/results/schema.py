@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..system.jsonvalues import JsonObject, JsonValue, without_none
 from ..system.reading import check_version, read_limited
 from ..system.strictjson import Size, WrongValueError, entries_of, json_tree, keys_of, object_of
+from . import schedule  # noqa: F401 - its types stand as text in results of a solve
 from .axisranges import AxisRangesResult
 from .checks import ChecksResult
 from .comparison import ComparisonResult

@@ -46,7 +46,7 @@ _STEPS = 1e12
 
 
 class _Place(NamedTuple):
-    """A dimension to round: parameter, component, name, dimension, bounds, value at the solution, and index of its task.
+    """A dimension to round: parameter, component, name, dimension, bounds, value at the solution, index of its task.
 
     The task is None for a dimension that is the same for all tasks.
     """

@@ -438,7 +438,7 @@ def combined_value_lines(combined: CombinedData) -> Iterator[Line]:
 
 
 def change_lines(result: CombinedResult) -> Iterator[Line]:
-    """Yield the gain by each dimension or pose that changes from task to task; both answers are those before rounding."""
+    """Yield the gain by each dimension or pose that changes from task to task, without rounding."""
     for change in result.combined.changes or ():
         words = _gain_words(change, result.combined) + (", before rounding" if result.rounding is not None else "")
         yield Line(words, label=f"{change.name} per task")

@@ -62,8 +62,8 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
 
 def schedule_table(schedule: ScheduleData) -> TextTable:
     """Return the settings and the objective at each point of the path."""
-    heads = ("t\ns",) if schedule.times is not None else ()
-    heads += tuple(f"{name}\n{unit}" for name, unit in zip(schedule.names, schedule.units, strict=True))
+    heads = [] if schedule.times is None else ["t\ns"]
+    heads += (f"{name}\n{unit}" for name, unit in zip(schedule.names, schedule.units, strict=True))
     rows = [
         (
             *(() if schedule.times is None else (number(schedule.times[i]),)),

@@ -50,7 +50,7 @@ def test_every_task_is_evaluated_at_its_settings(file: str, tmp_path: Path, cli:
     assert pytest.approx(wanted[0], rel=1e-12) == evaluate(read(PINS, **{"x1.task1": 6.5})).F
 
 
-def test_a_violated_limit_of_one_task_fails_the_evaluation(file: str, tmp_path: Path, cli: Run) -> None:
+def test_a_violated_limit_of_one_task_fails_the_evaluation(tmp_path: Path, cli: Run) -> None:
     limited = tmp_path / "limited.toml"
     limited.write_text(f"{PINS}\n[limits]\nleg_length = {{ max = 40.5 }}\n")
     status, words, _ = cli("evaluate", str(limited), "--set", "x1.task1=6", "--set", "x1.task2=12")
@@ -81,14 +81,15 @@ def test_results_with_settings_need_the_tasks_of_the_case(file: str, tmp_path: P
     assert "has a robot for each of 2 tasks, but 'shared' has one robot for all tasks; set the values" in fault
     # A result with one robot gives every task this robot.
     output_of(cli("evaluate", str(shared), "--set", "x1=9", "--json", str(solved)))
-    words = output_of(cli("evaluate", file, "--of", str(solved)))
+    status, words, notice = cli("evaluate", file, "--of", str(solved))
+    assert (status, "gives the dimensions of the case 'shared'" in notice) == (0, True)
     assert "x1.task1   9" in words
     assert "x1.task2   9" in words
 
 
 def test_a_row_of_a_sweep_is_a_solve_at_its_point(file: str, tmp_path: Path, cli: Run) -> None:
     out = tmp_path / "rows.csv"
-    output_of(cli("sweep", file, "--over", "x1.task2.max=8,9", "--out", str(out)))
+    assert cli("sweep", file, "--over", "x1.task2.max=8,9", "--out", str(out))[0] == 0
     with out.open() as lines:
         rows = list(csv.DictReader(lines))
     for row, most in zip(rows, (8.0, 9.0), strict=True):
@@ -139,7 +140,9 @@ def test_the_robot_of_the_case_is_compared_with_its_settings(tmp_path: Path, fil
     assert own.value == pytest.approx((BEST_PUSH + BEST_TURN) / 2, rel=1e-8)
     assert pytest.approx(BEST_TURN, rel=1e-8) == own.tasks[1].F
     data = tmp_path / "compared.json"
-    words = output_of(cli("compare", file, "case", "hexapod", "--certify", "--starts", "2", "--json", str(data)))
+    words = output_of(
+        cli("compare", file, "case", "hexapod", "--certify", "--part", "0", "--starts", "2", "--json", str(data))
+    )
     assert "Only the robot of the case changes x1 from task to task" in " ".join(words.split())
     robots = {robot["name"]: robot for robot in checked(data)["robots"]}
     names = [each["name"] for each in robots["case"]["dimensions"]]
@@ -156,7 +159,9 @@ def test_rounding_keeps_limits_and_finds_the_best_multiples(tmp_path: Path, cli:
     assert max(lengths) <= 40.4
     # F of the push is 6 (z / length)^2, so it gives the length.
     allowed = [x for x in np.arange(5, 12.1, 0.5) if np.sqrt(6 * 40.0**2 / pushed(x)) <= 40.4]
-    assert radii == pytest.approx([max(allowed, key=pushed), max(allowed, key=turned)])
+    level = max(min(float(pushed(one)), float(turned(other))) for one in allowed for other in allowed)
+    assert min(float(pushed(radii[0])), float(turned(radii[1]))) == pytest.approx(level, rel=1e-9)
+    assert all(min(abs(radius - each) for each in allowed) <= 1e-9 for radius in radii)
 
 
 @needs_compiler

@@ -2,20 +2,24 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from builders import Array, Run, case_from, commands_in, output_of, refusal_of, saved, unbroken
+from builders import Array, Run, case_from, case_of, commands_in, output_of, refusal_of, saved, unbroken
 from measures import circle_joints
-from path_cases import LEGS, PLATFORM, extreme, hexapod, turns_of
+from path_cases import BASE, LEGS, PLATFORM, extreme, hexapod, program, turns_of
 
 from screwsynth.nlp import Case, InputError, Judgement, Outcome, ProgrammedPath, Sense
+from screwsynth.nlp.path.dividing import divided_path
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
+from screwsynth.nlp.path.reader import path_without_settings
 from screwsynth.nlp.path.settings import changing_of
+from screwsynth.nlp.path.waypoints import waypoints
 from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_path_proof
 from screwsynth.nlp.proof.checker.workspace.path_poses import PathPoses
@@ -24,6 +28,9 @@ from screwsynth.nlp.proof.workspace.path_domain import covered
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_proof_writer import path_proof_of
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
+from screwsynth.nlp.solver.schedule.exchange import exchanged
+from screwsynth.nlp.solver.schedule.polish import polish
+from screwsynth.nlp.solver.schedule.problem import schedule_problem
 
 #: Points of a path with a turn about a tool that leans: position, roll, pitch, yaw, turn (degrees), time.
 TURN_ROWS = ((0, 0, 20, 10, 20, 0, -40, 0), (3, 1, 21, 0, 25, 30, 35, 4), (2, 3, 20, -15, 10, 10, 60, 8))
@@ -346,3 +353,45 @@ def test_a_fixed_turn_is_part_of_every_path() -> None:
         for sense in Sense:
             name = f"leg_length limb {leg}"
             assert extreme(one, name, sense).bound == pytest.approx(extreme(two, name, sense).bound, abs=1e-5)
+
+
+def test_a_schedule_that_is_violated_between_its_points_is_solved_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2] / "cases")
+    case = case_of("hexapod-yaw")
+    assert case.path is not None
+    problem = schedule_problem(replace(case, path=replace(case.path, has_limits=True)))
+    start = np.full((len(problem.points), 1), math.radians(-0.7))
+    (seed,) = [each for each in (polish(problem, np.zeros(0), start),) if each is not None]
+    found = exchanged(problem, seed)
+    assert found.judgement.is_proved
+    # Dense samples of the schedule, with own kinematics.
+    points, s = found.problem.points, found.schedule.s[:, 0]
+    path = path_without_settings(case)
+    worst = 0.0
+    for part in np.linspace(0, 1, 21):
+        begin = points.points.parameters[:-1]
+        end = np.where(points.points.segments[1:] == points.points.segments[:-1], points.points.parameters[1:], 1.0)
+        poses = path.poses_at(points.points.segments[:-1], begin + part * (end - begin))
+        turn = s[:-1] + part * np.diff(s)
+        c, w, z = np.cos(turn), np.sin(turn), np.zeros_like(turn)
+        R = poses.rotations @ np.moveaxis(np.array([[c, -w, z], [w, c, z], [z, z, z + 1]]), 2, 0)
+        legs = np.linalg.norm(poses.positions[:, None] + np.einsum("nij,kj->nki", R, PLATFORM) - BASE, axis=2)
+        worst = max(worst, float(legs.max()))
+        assert legs.min() >= 17
+    assert 42.9 < worst <= 43
+    assert (np.abs(np.diff(s)) <= math.radians(5) * points.seconds).all()
+
+
+def test_a_divided_path_has_the_same_poses() -> None:
+    text = "G20 G90 G94\nF100\nG1 X0 Y0 Z20 A0 B0 C0\nG1 X1 A5 B3\nG2 X3 Y0 I1 J0 C20\nG18 G3 X5 Z21 I1 K0.5\nM2"
+    for path in (program(hexapod(), text), replace(program(hexapod(), text), between=Between.SLERP)):
+        points = waypoints(path, 40).points
+        own = divided_path(path, points)
+        rng = np.random.default_rng(3)
+        k, s = rng.integers(0, len(own), 300), rng.random(300)
+        end = np.where(points.segments[k + 1] == points.segments[k], points.parameters[k + 1], 1.0)
+        at = points.parameters[k] + s * (end - points.parameters[k])
+        one, two = path.poses_at(points.segments[k], at), own.poses_at(k, s)
+        assert np.abs(one.positions - two.positions).max() < 1e-12
+        assert np.abs(one.rotations - two.rotations).max() < 1e-12
+        assert own.time == pytest.approx(path.time, rel=1e-12)

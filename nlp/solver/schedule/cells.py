@@ -12,6 +12,7 @@ The bound is for the design, and at the points of the path. Every sum is rounded
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
@@ -33,7 +34,7 @@ _CELLS, _LEVELS = 64, 24
 _MOST, _BATCH = 600_000, 20_000
 #: Relative rounding of a sum of the terms of a form: far above the number of terms times 2^-53.
 _ROUNDING = 2.0**-44
-#: Relative increase of the number of cells that a rate allows, for its rounding; and rounding of the ends of cells, as a
+#: Relative increase of the number of cells that a rate allows, for its rounding; rounding of the ends of cells, as a
 #: part of the largest end.
 _REACH, _EDGE = 1 + 1e-12, 2.0**-49
 
@@ -55,9 +56,9 @@ class CellBound(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """Kept cells of one point: ascending indices (c,), and upper bounds (c,) of the objective."""
+    """Kept cells of one point: ascending places (c,), and upper bounds (c,) of the objective."""
 
-    index: NDArray[np.intp]
+    places: NDArray[np.intp]
     upper: FloatArray
 
 
@@ -106,7 +107,7 @@ def cell_bound(problem: ScheduleProblem, d: FloatArray, value: float, gap: float
         bound = min(bound, max(most, value))
         if bound - value <= gap * abs(value):
             break
-        left = [one.index[each >= value] for one, each in zip(cells, through, strict=True)]
+        left = [one.places[each >= value] for one, each in zip(cells, through, strict=True)]
         if any(len(each) == 0 for each in left):
             bound = min(bound, value)
             break
@@ -156,13 +157,13 @@ class _Enclosed:
             upper[part] = self._upper(self._encloser(lower, higher))
         ends = np.cumsum([0, *(len(each) for each in kept)])
         found = []
-        for a, b in zip(ends[:-1], ends[1:], strict=True):
+        for a, b in pairwise(ends.tolist()):
             own = upper[a:b] > -math.inf
             found.append(_Cells(index[a:b][own], upper[a:b][own]))
         return found
 
     def _upper(self, forms: Forms) -> FloatArray:
-        """Return upper bounds (B,) of the objective; minus infinity where a limit is surely exceeded."""
+        """Return upper bounds (B,) of the objective; minus infinity where a limit is provably exceeded."""
         with np.errstate(invalid="ignore", over="ignore"):
             spread = np.abs(forms.a).sum(axis=2) + forms.r
             slack = _ROUNDING * (np.abs(forms.c) + spread)
@@ -200,12 +201,12 @@ def _pass(
     weights = problem.points.weights[::-1] if is_backward else problem.points.weights
     gains = [each.upper if problem.is_worst else _up(each.upper * w) for each, w in zip(cells, weights, strict=True)]
     neutral = math.inf if problem.is_worst else 0.0
-    level = np.full(len(cells[0].index), neutral)
+    level = np.full(len(cells[0].places), neutral)
     found = [level if is_backward else gains[0]]
     for i in range(1, len(cells)):
         whole = gains[i - 1] if not is_backward else _joined(problem, gains[i - 1], found[-1])
         source = found[-1] if not is_backward else whole
-        best = _largest_within(cells[i - 1].index, source, cells[i].index, reach[i - 1])
+        best = _largest_within(cells[i - 1].places, source, cells[i].places, reach[i - 1])
         if not (best > -math.inf).any():
             return None
         found.append(best if is_backward else _joined(problem, gains[i], best))

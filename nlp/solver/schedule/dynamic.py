@@ -93,7 +93,7 @@ def _stages(problem: ScheduleProblem, k: int, most: int) -> tuple[NDArray[np.int
 def _stage_weights(weights: FloatArray, stages: NDArray[np.intp], count: int) -> FloatArray:
     """Return the sums (S,) of the weights of the points nearest to each stage."""
     nearest = np.searchsorted(0.5 * (stages[1:] + stages[:-1]), np.arange(count))
-    return np.bincount(nearest, weights=weights, minlength=len(stages))
+    return np.asarray(np.bincount(nearest, weights=weights, minlength=len(stages)), dtype=np.float64)
 
 
 def _allowed(excess: FloatArray) -> FloatArray:

@@ -29,8 +29,9 @@ from .problem import ScheduleProblem
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Margin of the limits at added points, relative to the limits; and gap of the proofs.
-_MARGIN, _GAP = 1e-4, 1e-4
+#: Margins of the limits at added and at all other points, relative to the limits, as a limit that is exactly reached
+#: cannot be proved; and gap of the proofs.
+_MARGIN, _LEAST, _GAP = 1e-4, 2e-6, 1e-4
 #: Largest number of proofs.
 _MOST = 12
 #: Fractions of the way between two points at which limits are sampled for further places.
@@ -87,9 +88,9 @@ def _with_points(
     finer = with_places(path, points, before)
     old, new = (each.points.segments + each.points.parameters for each in (points, finer))
     own = np.stack([np.interp(new, old, column) for column in schedule.s.T], axis=1)
-    margins = np.where(np.isin(new, before.sum(axis=1)), _MARGIN, 0.0)
+    margins = np.where(np.isin(new, before.sum(axis=1)), _MARGIN, _LEAST)
     known = np.isin(new, old)
-    margins[known] = 0.0 if problem.margins is None else problem.margins
+    margins[known] = _LEAST if problem.margins is None else problem.margins
     refined = replace(problem, points=finer, margins=margins)
     return refined, within_rates(refined, own)
 

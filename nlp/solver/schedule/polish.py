@@ -95,16 +95,9 @@ def _search(
         g.append(ca.Function("own", [problem.symbols[0]], [problem.of_design])(design))
         low, high = low + [-math.inf] * problem.of_design.numel(), high + [0.0] * problem.of_design.numel()
     if rows > 1:
-        for j in range(k):
-            steps = problem.steps[:, j] * (1 - INSIDE) / half[n + j]
-            limited = np.flatnonzero(np.isfinite(steps)).tolist()
-            row = x[n + j : n + rows * k : k]
-            # As parts of the rates: an error of one step would grow along the path.
-            g.append((row[1:] - row[:-1])[limited] / ca.DM(steps[limited]))
-            low, high = low + [-1.0] * len(limited), high + [1.0] * len(limited)
-            if problem.is_periodic:
-                g.append(row[-1] - row[0])
-                low, high = [*low, 0.0], [*high, 0.0]
+        rates, ends_of_rates = _rate_rows(problem, x[n : n + rows * k], half[n:])
+        g += rates
+        low, high = low + [-end for end in ends_of_rates], high + ends_of_rates
     x0 = np.concatenate([(d - centre[:n]) / half[:n], ((s[:rows] - centre[n:]) / half[n:]).ravel()])
     lbx, ubx = -np.ones(len(x0)), np.ones(len(x0))
     if goal == "level":
@@ -130,6 +123,27 @@ def _search(
     if not problem.is_feasible(d_new, s_new):
         return None
     return Polished(d_new, s_new, problem.value(d_new, s_new))
+
+
+def _rate_rows(problem: ScheduleProblem, s: MX, half: FloatArray) -> tuple[list[MX], list[float]]:
+    """Return steps as parts of the rates, since an error of a step would grow along the path, and their largest sizes.
+
+    Args:
+        problem: the problem.
+        s: (N k, 1) scaled settings, point by point.
+        half: (k,) half widths of their ranges.
+    """
+    rows, sizes, k = list[MX](), list[float](), len(half)
+    for j in range(k):
+        steps = problem.steps[:, j] * (1 - INSIDE) / half[j]
+        limited = np.flatnonzero(np.isfinite(steps)).tolist()
+        own = s[j::k]
+        rows.append((own[1:] - own[:-1])[limited] / ca.DM(steps[limited]))
+        sizes += [1.0] * len(limited)
+        if problem.is_periodic:
+            rows.append(own[-1] - own[0])
+            sizes.append(0.0)
+    return rows, sizes
 
 
 def within_rates(problem: ScheduleProblem, s: FloatArray) -> FloatArray:

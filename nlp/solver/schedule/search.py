@@ -37,7 +37,7 @@ from .problem import ScheduleProblem, ends, schedule_problem
 #: Largest number of designs from which the search begins.
 _DESIGNS = 8
 
-#: Function to call after each design, with the number of designs done, the number of all, and the best objective so far.
+#: Function to call after each design: number of designs done, number of all, and best objective so far.
 DesignProgress = Callable[[int, int, float | None], None]
 
 
@@ -80,8 +80,8 @@ def solve_schedule(
         fixed += held
         found += [*held, *_schedules(problem, d, held, fine=not coarse)]
         if progress is not None:
-            best = max((each.value for each in found), default=None)
-            progress(done + 1, len(designs), None if best is None else problem.sign * best)
+            values = [each.value for each in found]
+            progress(done + 1, len(designs), problem.sign * max(values) if values else None)
     if not found:
         return _solution(problem, None, None, None, began, search)
     best = max(found, key=lambda each: each.value)
