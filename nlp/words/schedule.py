@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ...models.statics import driven_joints
-from ..case.forces import dimension_of_measure
 from ..case.pose import OverPoses
 from ..case.task import LEG_LENGTH
+from ..results.objective import unit_of_objective
 from .numbers import number
 from .text import Line, TextTable, Tone
 
@@ -26,21 +25,11 @@ def objective_name(case: Case) -> str:
     return f"mean {name}" if is_mean else name
 
 
-def objective_unit(case: Case) -> str:
-    """Return the unit of the objective over the path; empty for F."""
-    measure = case.tasks[0].measure
-    if not measure:
-        return ""
-    if measure == LEG_LENGTH:
-        return case.units.length
-    return case.units.label(dimension_of_measure(measure, driven_joints(case.model)[0]))
-
-
 def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTable]:
     """Yield the objective with its gain over the best constant, the bound, and the rates."""
     name, segments = objective_name(case), schedule.segments
     where = f"along {segments:,} segment{'s' * (segments != 1)}"
-    unit = objective_unit(case)
+    unit = unit_of_objective(case) if case.tasks[0].measure else ""
     yield Line(f"{name} = {number(schedule.value)}{f' {unit}' if unit else ''}", tone=Tone.ANSWER, after=f" {where} ({_gain(schedule)})")
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
