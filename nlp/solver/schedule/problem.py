@@ -3,7 +3,8 @@
     maximise  sum_i w_i sum_j F_j(d, s_i, point_i)   or   min_ij F_j(d, s_i, point_i)
 
 over the design d and the settings s_i at N points, within limits at each point and ``|s_(i+1) - s_i| <= rate dt_i``. F
-is negative for a minimum. The function is mapped over the points, so its expressions do not grow with the path.
+is negative for a minimum. A quantity of the legs or actuators has the largest one as value of a point: ``min_j`` takes
+the place of the sum. The function is mapped over the points, so its expressions do not grow with the path.
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import Dimension, FloatArray, RobotInstance, Substitution, instantiate
+from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, instantiate
 from ....models.joints.model.closedform import closed_form
 from ....models.rotation import matrix_from_axis_angle
+from ....models.statics import posed_statics
 from ....models.values import dataclass
 from ...case.case import Case
 from ...case.choices import check_no_catalogue
+from ...case.forces import forces_at
 from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ...case.pathfile import TURN
@@ -32,6 +35,7 @@ from ...case.task import LEG_LENGTH, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
 from ...path.waypoints import Waypoints, waypoints
+from ...program.actuators import signed_values
 from ...program.layout import reference_of
 
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
@@ -64,7 +68,7 @@ class Values(NamedTuple):
     """Values at points of the path.
 
     Attributes:
-        objective: (N, T) signed F of each task, or negative leg lengths.
+        objective: (N, T) signed F of each task, or negative quantities of legs or actuators.
         excess: (N, c) amounts by which limits are exceeded, relative to their sizes; negative within a limit.
     """
 
@@ -112,6 +116,11 @@ class ScheduleProblem:
         return self.case.over_path is OverPoses.WORST
 
     @property
+    def has_levels(self) -> bool:
+        """True if the value of a point is the worst of its objectives: quantities of legs or actuators."""
+        return bool(self.case.tasks[0].measure)
+
+    @property
     def is_periodic(self) -> bool:
         """True if settings are equal at the first and the last point."""
         return self.case.path is not None and self.case.path.periodic
@@ -148,9 +157,10 @@ class ScheduleProblem:
         return Values(objective.full().T, limits.full().T)
 
     def combined(self, objective: FloatArray) -> FloatArray:
-        """Return the value of each point from the objectives (..., T) of its tasks: their sum, or the worst."""
+        """Return the value of each point from its objectives (..., T): their sum, or the worst."""
         weighted = objective * self.weights
-        return np.asarray(weighted.min(axis=-1) if self.is_worst else weighted.sum(axis=-1))
+        is_worst = self.is_worst or self.has_levels
+        return np.asarray(weighted.min(axis=-1) if is_worst else weighted.sum(axis=-1))
 
     def value(self, d: FloatArray, s: FloatArray) -> float:
         """Return the signed objective of a design (n,) and a schedule (N, k)."""
@@ -230,11 +240,8 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     rows = [row for each in stated for row in _rows(*each, case.characteristic_length)]
     varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
-    lengths = case.tasks[0].measure == LEG_LENGTH
-    values = ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs]) if lengths else robot.F
-    if lengths and not robot.legs:
-        raise CaseError("objective.minimise", f"needs legs, but {case.model.name!r} has none", LEG_LENGTH)
-    weights = [1.0] * values.numel() if lengths else [task.weight for task in case.tasks]
+    values = _values(case, model, robot)
+    weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
     return ScheduleProblem(
         case=case,
         points=points,
@@ -303,6 +310,19 @@ def _twist(task: Task, position: SX, feed: SX, axis: SX) -> SX:
     if task.follows == "tool":
         return ca.vertcat(axis, ca.cross(position, axis))
     return SX([float(part) for part in np.asarray(task.twist)])
+
+
+def _values(case: Case, model: Model, robot: RobotInstance) -> SX:
+    """Return F (T, 1) of the tasks at a point, or the quantities of legs or actuators that are minimised."""
+    measure = case.tasks[0].measure
+    if not measure:
+        return robot.F
+    if measure == LEG_LENGTH:
+        if not robot.legs:
+            raise CaseError("objective.minimise", f"needs legs, but {case.model.name!r} has none", LEG_LENGTH)
+        return ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs])
+    forces = forces_at(model, posed_statics(model, robot), robot.rotation, case.loading, robot.size)
+    return ca.vertcat(*[each.value for each in signed_values(case, forces)])
 
 
 def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedConstraint]:

@@ -19,7 +19,7 @@ from ...case.case import Case
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses, Rotation
 from ...case.settings import Search
-from ...case.task import LEG_LENGTH, Sense, Task
+from ...case.task import Sense, Task
 from ...interruption import is_requested
 from ...path.path import Poses
 from ...program.formulation import formulate
@@ -221,7 +221,7 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         "thrust": (0.0, 0.0, 0.0, *axis),
         "tool": (*axis, *np.cross(p, axis)),
     }
-    if task.measure == LEG_LENGTH:
+    if task.measure:
         task = Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False)
     elif task.follows:
         task = replace(task, twist=twists[task.follows], follows="")
