@@ -169,7 +169,8 @@ def test_a_pose_per_task_of_section_4_3() -> None:
 
 
 def test_the_page_says_what_its_cases_give(cli: Run, tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "changing.md").read_text(encoding="utf-8")
+    whole = (Path(__file__).parents[2] / "docs" / "changing.md").read_text(encoding="utf-8")
+    page = whole[: whole.index("## Yaw of a hexapod")]
     pins_text, poses_text = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     file = tmp_path / "pins.toml"
     file.write_text(pins_text)
