@@ -113,7 +113,6 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
         "has_module": bool(module),
         "stated_tasks": _for_json(stated_tasks(case)),
         "prefixes": list(case.pose_prefixes),
-        "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
     parts = {
         "title": tag("title", f"{case.title or case.name} - screwsynth"),
@@ -238,10 +237,12 @@ def _view(source: ViewSource, x: FloatArray) -> list[float]:
 def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
     """Return the picture and the controls."""
     stated = drawing.case is not None and case.tasks[0].is_stated
-    choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
+    choices = [("rate 0", "rate of the shown task")] if case.changes and stated else []
+    if not case.changes:
+        choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
     choices += [(f"force {k}", f"actuator force, {name}") for k, name in enumerate(data["loads"])]
     options = [tag("option", words, value=value) for value, words in choices or [("rate 0", "rate")]]
-    poses = [tag("option", f"pose {k + 1}", value=k) for k in range(data["poses"])]
+    poses = [tag("option", words, value=k) for k, words in enumerate(_pose_words(data))]
     words = "Robot in three dimensions. Arrow keys turn it, plus and minus zoom, 0 resets the view."
     picture = tag(
         "figure",
@@ -259,6 +260,17 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
         id="picture",
     )
     return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
+
+
+def _pose_words(data: ViewData) -> list[str]:
+    """Return the name of each pose: that of its task, if dimensions or the pose change from task to task."""
+    tasks = data["pose_tasks"]
+    if not tasks:
+        return [f"pose {k + 1}" for k in range(data["poses"])]
+    names = [data["tasks"][task]["name"] for task in tasks]
+    if len(set(tasks)) == len(tasks):
+        return names
+    return [f"{name}, pose {tasks[: k + 1].count(task)}" for k, (name, task) in enumerate(zip(names, tasks, strict=True))]
 
 
 def _legend(*, stated: bool) -> str:
