@@ -60,8 +60,8 @@ export class LimitBars {
 
 /** Smallest limit on a force or speed of an actuator, in units of computations; NaN without one. @param {State} state @param {"actuator_force" | "actuator_speed"} kind @param {string} name */
 const limitOf = (state, kind, name) => {
-  const own = state.sides.filter(({ key, row }) => key.startsWith(kind) && `${row.name} `.includes(`actuator ${name} `));
-  const found = own.map(({ settable, stated }) => Math.abs(settable < 0 ? stated : state.module.arrays.limits[settable]));
+  const own = state.sides.filter((/** @type {any} */ { key, row }) => key.startsWith(kind) && `${row.name} `.includes(`actuator ${name} `));
+  const found = own.map((/** @type {any} */ { settable, stated }) => Math.abs(settable < 0 ? stated : state.module.arrays.limits[settable]));
   return found.length ? Math.min(...found) : NaN;
 };
 
@@ -84,10 +84,10 @@ export const showActuators = (state) => {
     columns.forEach(({ values, kind }, i) => {
       const largest = Math.max(...values.map(Math.abs)), limit = limitOf(state, kind, each.name), value = settled(values[k], largest);
       const part = Math.abs(value) / (Number.isFinite(limit) ? limit : largest || 1), factor = kind === "actuator_speed" ? each.factor : 1;
-      const [text, track] = row.children[i + 1].children;
+      const [text, track] = /** @type {HTMLCollectionOf<HTMLElement>} */ (row.children[i + 1].children), fill = /** @type {HTMLElement} */ (track.firstChild);
       const isOver = part > 1 + 1e-6 && Number.isFinite(limit);
       say(text, `${digits(value * factor, 5)}${isOver ? " violated" : ""}`);
-      track.firstChild.style.width = `${Math.min(100, 100 * part).toFixed(1)}%`;
+      fill.style.width = `${Math.min(100, 100 * part).toFixed(1)}%`;
       track.title = Number.isFinite(limit) ? `${digits(100 * part, 3)} % of the limit` : `${digits(100 * part, 3)} % of the largest`;
       row.children[i + 1].classList.toggle("violated", isOver);
     });

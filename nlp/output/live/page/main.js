@@ -9,6 +9,8 @@ import { TaskSliders } from "./tasks.js";
 import { LimitBars, showActuators } from "./bars.js";
 import { addJumps } from "./jumps.js";
 import { ValueMap } from "./map.js";
+import { Player } from "./play.js";
+import { Track } from "./track.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -62,15 +64,16 @@ const coneLimit = (key, index) => {
 };
 
 const draw = () => {
-  const view = state ? state.module.arrays.view : data.view;
+  const view = player?.view ?? (state ? state.module.arrays.view : data.view);
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
   const p = state ? state.module.arrays.p : data.p;
   const coloured = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
   const task = data.pose_tasks[state?.pose ?? 0] ?? coloured;
-  const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
+  const twist = data.is_stated && !track ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
-  if (!picture.fitted.length) picture.fitted = extentOf(robot, data.scene, twist);
+  if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];
   const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist, cones: conesOf(view, data, coneLimit) });
+  if (track) pieces.push(...track.pieces(axes, palette)), pieces.sort((a, b) => a.depth - b.depth);
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();
   for (const link of data.scene.links) {
@@ -90,6 +93,7 @@ const show = () => {
     showValues(state, bars?.refresh() ?? []);
     showActuators(state);
     map?.refresh();
+    track?.refresh();
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
     byId("mode-evaluate").setAttribute("aria-pressed", String(isEvaluated));
@@ -104,6 +108,10 @@ let map;
 let fields;
 /** @type {LimitBars | undefined} */
 let bars;
+/** @type {Player | undefined} */
+let player;
+/** @type {Track | undefined} */
+let track;
 /** @type {Map<any, () => void>} */
 const pending = new Map();
 /**
@@ -112,6 +120,8 @@ const pending = new Map();
  * @param {any} [key]
  */
 const change = (act, key = Symbol("change")) => {
+  // Any other change ends a motion, at the pose where it began.
+  if (key !== player) player?.stop();
   pending.set(key, act);
   if (isWaiting) return;
   isWaiting = true;
@@ -221,10 +231,19 @@ if (data.has_module) {
   fields = new TaskSliders(state, change);
   map = new ValueMap(state, change);
   addJumps(state, change);
+  player = new Player(state, data, change);
   listen();
+  if (data.track) {
+    track = new Track(state, data.track, change, globalThis.document);
+    // The pose is that of the path, and the picture contains the path.
+    picture.grab = null;
+    picture.fitted = [];
+  }
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
-  Object.assign(globalThis, { screwsynth: { state, show, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
+  Object.assign(globalThis, { screwsynth: { state, show, player, track, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
   show();
+} else {
+  player = new Player(null, data, change);
 }
 document.documentElement.dataset.ready = "yes";
