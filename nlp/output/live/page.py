@@ -231,7 +231,7 @@ def _answer(solution: Solution) -> dict[str, Any]:
     """Return the program's answer: point, words of the terminal's headline, and whether it is an optimum."""
     combination = solution.combination
     own = solution.outcomes[0].own if combination is None else combination.combined
-    x = solution.outcomes[0].x if own is None else own.x
+    x = solution.x if own is None else own.x
     result = result_of(solution)
     words = headline(result, solution.case).words if isinstance(result, SolveResult) else _combined_words(solution)
     return {"x": x.tolist(), "words": words, "isOptimum": solution.status.is_answer}
