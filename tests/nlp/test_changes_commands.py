@@ -199,7 +199,7 @@ def test_a_live_page_has_a_slider_for_every_setting(tmp_path: Path, cli: Run) ->
     data = json.loads(found[1])
     assert [each["name"] for each in data["sliders"]][:3] == ["x1.task1", "x1.task2", "x2"]
     assert [data["pose_tasks"], data["stated_poses"]] == [[0, 1], [0, 0]]
-    assert data["answer"]["x"] == pytest.approx([BEST_PUSH, BEST_TURN], rel=1e-6)
+    assert data["answer"]["x"] == pytest.approx([6 * 3**0.5 / 2, 12], rel=1e-6)
     assert ">turn</option>" in page.read_text()
 
 

@@ -54,7 +54,7 @@ def live_view_of(solution: Solution, command: str) -> LiveView:
         command: name of the case on the command line.
     """
     case = solution.chosen_case
-    if case.over_path is not None:
+    if solution.case.over_path is not None:
         words = "This page has no sliders: its robot changes along the path."
         return LiveView(tag("p", words, class_="note"), is_live=False)
     try:
