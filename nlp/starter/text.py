@@ -164,6 +164,7 @@ def _range_lines(model: Model, home: Home) -> list[str]:
     return [
         "# ranges here: the search chooses ONE pose. For a robot that works at ALL poses of a box,",
         '# use [workspace] below, and over = "workspace" in [limits].',
+        '# per = "task"   # with several [[task]] tables: the search chooses a pose for each task',
     ]
 
 

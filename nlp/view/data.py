@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 
@@ -145,7 +145,11 @@ class QuantityData(TypedDict):
 
 
 class ViewData(TypedDict):
-    """Everything that a live page needs besides its module and its drawing."""
+    """Everything that a live page needs besides its module and its drawing.
+
+    ``stated_poses`` has the index of the stated pose of each pose. ``pose_tasks`` has the index of its task if dimensions
+    or the pose change from task to task, and is empty otherwise.
+    """
 
     arrays: list[ArrayData]
     blocks: Mapping[str, tuple[int, int]]
@@ -164,6 +168,8 @@ class ViewData(TypedDict):
     F_unit: str
     sense: str
     poses: int
+    stated_poses: list[int]
+    pose_tasks: list[int]
     limbs: list[str]
     row_limbs: list[str]
     seeds: int
@@ -217,6 +223,8 @@ def view_data(source: ViewSource) -> ViewData:
         "F_unit": unit_of_objective(case, 0) if len(case.tasks) == 1 else unit_of_objective(case),
         "sense": nlp.sense.value,
         "poses": len(program.robots),
+        "stated_poses": [each.pose for each in case.stations],
+        "pose_tasks": list(program.places.tasks),
         "limbs": list(case.model.limbs),
         "row_limbs": [row.limb for row in case.model.frame_rows],
         "seeds": 16,
@@ -248,11 +256,10 @@ def arrays_of(nlp: Nlp, functions: ViewFunctions) -> list[ArrayData]:
 def _sliders(nlp: Nlp) -> Iterator[SliderData]:
     """Yield the sliders of dimensions and poses."""
     case, places = nlp.case, nlp.program.places
-    count = sum(len(item.components) for item in case.model.parameters)
-    parameters = [item for item in case.model.parameters for _ in item.components]
+    parameters = [each.parameter for each in _dimensions(case)]
     size = length_of(case.model, _parameter_values(nlp))
     for k, ((name, dimension), place) in enumerate(zip(case.scalars.items(), places.numbers, strict=True)):
-        parameter = parameters[k] if k < count else None
+        parameter = parameters[k] if k < len(parameters) else None
         low, high, start = _range(nlp, place, dimension, size, parameter)
         factor = case.units.shown(1.0, dimension)
         yield {
@@ -295,11 +302,28 @@ def _stated_pose(case: Case, name: str) -> int:
     return next(k for k, prefix in enumerate(prefixes) if len(prefixes) == 1 or name.startswith(prefix))
 
 
+class _Dimension(NamedTuple):
+    """Component of a parameter, with the index of its task if it changes from task to task."""
+
+    parameter: Parameter
+    task: int | None
+
+
+def _dimensions(case: Case) -> Iterator[_Dimension]:
+    """Yield the components of the robot's parameters in the order of a program's numbers."""
+    own = case.dimensions_per_task
+    for item in case.model.parameters:
+        for key in item.components:
+            for task in range(len(case.tasks)) if key in own else (None,):
+                yield _Dimension(item, task)
+
+
 def _parameter_values(nlp: Nlp) -> list[float]:
-    """Return the values of the robot's parameters at the start."""
-    count = sum(len(item.components) for item in nlp.case.model.parameters)
+    """Return the values of the robot's parameters at the start; those of the first task if they change with it."""
     vectors: Mapping[str, FloatArray] = {"x": nlp.start, "p": nlp.arguments}
-    return [float(vectors[place.vector][place.index]) for place in nlp.program.places.numbers[:count]]
+    dimensions = [*_dimensions(nlp.case)]
+    named = zip(dimensions, nlp.program.places.numbers[: len(dimensions)], strict=True)
+    return [float(vectors[place.vector][place.index]) for each, place in named if each.task in (None, 0)]
 
 
 def _range(

@@ -67,7 +67,8 @@ def view_functions(nlp: Nlp, prefix: str) -> ViewFunctions:
 
     The blocks of the result are ``points``, ``circles`` (centre, point and normal), ``directions`` (origin and vector),
     ``joints`` (position and axes), ``rotation`` (row by row), ``position``, ``rows`` (J with moments about the
-    platform's origin, row by row), ``rates`` (row by row, one for each task), ``F``, ``magnitude`` (bounds on F without
+    platform's origin, row by row), ``rates`` (row by row, one for each task; only the
+    task of the pose if dimensions or the pose change from task to task), ``F``, ``magnitude`` (bounds on F without
     cancellation), ``quantities``, ``cones`` (centre and unit axis of each joint with a limited angle), and where loads
     or a motion are given ``largest``, ``smallest`` (forces of each load case) and ``speeds``.
     """
@@ -129,8 +130,7 @@ def level_rows(nlp: Nlp) -> tuple[int, ...]:
 def _pose_variables(nlp: Nlp) -> tuple[int, ...]:
     """Return the indices in ``x`` of the coordinates of the stated poses."""
     places = nlp.program.places
-    count = sum(len(item.components) for item in nlp.case.model.parameters)
-    found = {place.index for place in places.numbers[count:] if place.vector == "x"}
+    found = {place.index for place in places.numbers[places.dimensions :] if place.vector == "x"}
     return tuple(sorted(found.union(*(each.q for each in places.rotations if isinstance(each, FreeRotation)))))
 
 

@@ -16,7 +16,7 @@ from ..embedding.manifest import solver_files
 from ..embedding.subject import Subject, find_subject
 from ..embedding.templates import casadi_texts
 from ..errors import CaseError
-from ..program.formulation import formulate_each
+from ..program.formulation import formulate_each, formulate_whole
 from ..program.nlp import Nlp
 from .functions import ViewFunctions, view_functions
 
@@ -60,7 +60,6 @@ def view_source(case: Case) -> ViewSource:
         CaseError: the case is inconsistent, or C cannot be generated for it.
         InputError: the functions of the case have no finite value at any trial point.
     """
-    _refuse_changes(case)
     subject = find_subject(case)
     generated = c_of_subject(subject)
     prefix = identifier(case.name)
@@ -72,17 +71,6 @@ def view_source(case: Case) -> ViewSource:
     return ViewSource(subject, functions, files)
 
 
-def _refuse_changes(case: Case) -> None:
-    """Refuse a case whose dimensions or pose change from task to task.
-
-    Raises:
-        CaseError: the case is such a case.
-    """
-    if case.changes:
-        fault = "changes from task to task, but a live page shows one robot for all tasks; use report"
-        raise CaseError(case.changing_key, fault, source=case.source)
-
-
 def view_without_solver(case: Case, error: CaseError) -> ViewSource:
     """Return the live view of a case for which C cannot be generated: its drawing, without a module.
 
@@ -90,8 +78,7 @@ def view_without_solver(case: Case, error: CaseError) -> ViewSource:
         case: the case.
         error: reason why C cannot be generated.
     """
-    _refuse_changes(case)
-    subject = Subject(formulate_each(case)[0], None)
+    subject = Subject(formulate_whole(case) if case.changes else formulate_each(case)[0], None)
     functions = view_functions(subject.nlp, f"{identifier(case.name)}_VIEW")
     return ViewSource(subject, functions, {}, _reason(case, error))
 

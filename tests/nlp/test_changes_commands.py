@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,10 @@ from test_changes import BEST_PUSH, BEST_TURN, PINS, SECTION_4_3, pins, pushed, 
 
 from screwsynth.nlp import Case, compare, pareto, solve, tradeoff
 from screwsynth.nlp.case.pose import Free
+from screwsynth.nlp.case.toml import toml_text
 from screwsynth.nlp.embedding.subject import find_subject
 from screwsynth.nlp.evidence.evaluation import evaluate
+from screwsynth.nlp.output.live.casefile import case_parts, stated_tasks
 from screwsynth.nlp.results.evaluation import evaluation_at
 from screwsynth.nlp.results.schema import result_schema
 
@@ -185,12 +188,39 @@ def test_an_average_has_no_c(tmp_path: Path, cli: Run) -> None:
     assert (status, "must be 'weighted-sum' or 'worst-case' for C" in fault) == (2, True)
 
 
-def test_a_live_page_is_refused(file: str, tmp_path: Path, cli: Run) -> None:
-    page = tmp_path / "page.html"
-    status, _, fault = cli("view", file, "--out", str(page), "--no-open")
-    assert status == 2
-    assert "robot.parameters.x1: changes from task to task, but a live page shows one robot for all tasks" in fault
-    assert not page.exists()
+def test_a_live_page_has_a_slider_for_every_setting(tmp_path: Path, cli: Run) -> None:
+    """An average has no solver in the page, so this page needs no compiler."""
+    case, page = tmp_path / "case.toml", tmp_path / "page.html"
+    case.write_text(PINS.replace("worst-case", "average"))
+    words = output_of(cli("view", str(case), "--out", str(page), "--no-open"))
+    assert "does not combine tasks by the average" in words
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.DOTALL)
+    assert found is not None
+    data = json.loads(found[1])
+    assert [each["name"] for each in data["sliders"]][:3] == ["x1.task1", "x1.task2", "x2"]
+    assert [data["pose_tasks"], data["stated_poses"]] == [[0, 1], [0, 0]]
+    assert data["answer"]["x"] == pytest.approx([6 * 3**0.5 / 2, 12], rel=1e-6)
+    assert ">turn</option>" in page.read_text()
+
+
+@pytest.mark.parametrize("text", [PINS, SECTION_4_3], ids=["dimension", "pose"])
+def test_a_copied_case_file_states_the_setting_of_every_task(text: str) -> None:
+    case = read(text)
+    values = {name: f"{1 + k / 8:g}" for k, name in enumerate(case.scalars)}
+    values |= {f"{prefix}axis": "[0, 0, 1]" for prefix in case.pose_prefixes}
+    values |= {f"{prefix}angle": "0.5" for prefix in case.pose_prefixes}
+    for k, task in enumerate(stated_tasks(case)):
+        values |= {f"task[{k}].{key}": toml_text(value) for key, value in task.items()}
+    parts = case_parts(case, ())
+    again = read("".join(each if isinstance(each, str) else values[each["set"]] for each in parts))
+    shown = [again.of_task(k) for k in range(2)]
+    for k, own in enumerate(shown):
+        for item in case.model.parameters:
+            name = f"{item.name}.task{k + 1}"
+            stated = float(values[name if name in values else item.name])
+            assert case.units.shown(float(own.components(item.name)[0]), item.dimension) == pytest.approx(stated)
+        prefix = case.pose_prefixes[k % len(case.pose_prefixes)]
+        assert own.position == pytest.approx([float(values[f"{prefix}p_{letter}"]) for letter in "xyz"])
 
 
 def test_an_evaluation_starts_in_the_middle_of_every_range() -> None:

@@ -391,7 +391,7 @@ REFUSALS = {
         above('path = { flie = "a.ngc" }'),
         (
             "case.toml: path.flie: no such key; did you mean 'file'? allowed: file, unit, start, "
-            "offsets, angles, between, flavour, end_of_file, part, macros, place"
+            "offsets, angles, between, flavour, end_of_file, part, macros, place, tool, periodic"
         ),
     ),
     "settings": (

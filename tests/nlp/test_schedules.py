@@ -6,6 +6,7 @@ import csv
 import itertools
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -455,3 +456,43 @@ def test_a_bound_of_zero_is_relative_to_the_robot() -> None:
     assert LENGTH.size(0.0, 40.0) == 40.0
     assert SQUARED_LENGTH.size(0.0, 40.0) == 1600.0
     assert (NUMBER.size(0.0, 40.0), LENGTH.size(-3.0, 40.0)) == (1.0, 3.0)
+
+
+def test_report_has_map_and_points_of_the_schedule(tmp_path: Path, cli: Run) -> None:
+    page = tmp_path / "page.html"
+    assert cli("report", str(_written(tmp_path, count=12)), "--out", str(page))[0] == 0
+    text = page.read_text()
+    schedule = text[text.index('id="schedule"') : text.index('id="robot"')]
+    assert "data:image/svg+xml" in schedule
+    points = schedule[schedule.index('id="points"') :]
+    assert points[points.index("<tbody") : points.index("</tbody")].count("<tr") == 12
+    words = re.sub(r"<[^>]*>", "", text)
+    for each in ("its robot changes along the path", "a motion that follows the feed", "best constant turn"):
+        assert each in words
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("view", "--no-open", "--out", "page.html"),
+        ("evaluate",),
+        ("certify",),
+        ("sweep", "--over", "x1=20:30:3", "--out", "sweep.csv"),
+        ("tradeoff", "--over", "x1=20:30:3"),
+        ("pareto", "--goal", "max F", "--goal", "min F"),
+        ("compare", "case", "6-ups"),
+        ("export", "--format", "mjcf", "--out", "files"),
+        ("inverse", "--poses", "hexapod-yaw.csv", "--csv", "joints.csv"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_commands_with_one_robot_refuse_a_schedule(
+    tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
+) -> None:
+    case = _written(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    before = {*tmp_path.iterdir()}
+    refusal = _refusal(cli, words[0], str(case), *words[1:])
+    assert 'objective.as = "mean": turn changes along the path' in refusal
+    assert "use solve" in refusal
+    assert {*tmp_path.iterdir()} == before

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from builders import EACH_KIND, Array, assert_words, soaked
 from numpy.typing import ArrayLike
+from test_changes import SECTION_4_3, pushed, read, turned
 
 from screwsynth.models import model_names
 from screwsynth.nlp import Case, Nlp, load_case, shipped_cases, solve
@@ -29,8 +30,8 @@ from screwsynth.nlp.view.wasm import compile_module, find_compiler
 
 HARNESS = Path(__file__).parent / "view_values.mjs"
 MODULE = Path(live.__file__).parent / "page" / "module.js"
-FEW = ("hexapod-machining", "paper-4.1-helical", "hexapod-spindle", "flight-simulator")
-LIVE = [*shipped_cases(), *(f"new {name}" for name in model_names())]
+FEW = ("fixture-pins", "hexapod-machining", "paper-4.1-helical", "hexapod-spindle", "flight-simulator")
+LIVE = ["pose for each task", *shipped_cases(), *(f"new {name}" for name in model_names())]
 needs = [
     pytest.mark.skipif(shutil.which("node") is None, reason="Node is not installed"),
     pytest.mark.skipif(find_compiler() is None, reason="no compiler for WebAssembly is installed"),
@@ -59,6 +60,8 @@ def made(name: str) -> Made:
 
 
 def case_of(name: str) -> Case:
+    if name == "pose for each task":
+        return read(SECTION_4_3)
     return read_viewed(name[4:], {}).file.case if name.startswith("new ") else load_case(name)
 
 
@@ -133,7 +136,7 @@ def check_values(found: dict[str, Any], given: Made, x: Array, p: Array, pose: i
         close(block(found, given.source, "speeds"), [each.value for each in loads.speeds], error)
 
 
-@pytest.mark.parametrize("name", soaked(LIVE, [*FEW, "new 6-ups"]))
+@pytest.mark.parametrize("name", soaked(LIVE, [*FEW, "pose for each task", "new 6-ups"]))
 def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
     given = made(name)
     nlp, count = given.nlp, 100
@@ -145,6 +148,21 @@ def test_values_are_those_of_the_program(name: str, tmp_path: Path) -> None:
     found = run(tmp_path, given, points)["points"]
     for k, each in enumerate(found):
         check_values(each, given, x[k], p[k], int(poses[k]))
+
+
+def test_every_task_has_its_robot(tmp_path: Path) -> None:
+    """The robot of each task depends on the setting of this task only: closed forms."""
+    given = made("fixture-pins")
+    nlp = given.nlp
+    assert given.source.functions.blocks["F"][1] == 1
+    names = [each.name for each in nlp.program.variables]
+    x = np.array(nlp.start)
+    x[names.index("x1.task1")], x[names.index("x1.task2")] = 6.5, 11.0
+    points = [{"x": x.tolist(), "p": nlp.arguments.tolist(), "pose": pose} for pose in (0, 1)]
+    found = [block(each, given.source, "F") for each in run(tmp_path, given, points)["points"]]
+    (push,), (turn,) = found
+    assert push == pytest.approx(float(pushed(6.5)), rel=1e-12)
+    assert turn == pytest.approx(float(turned(11.0)), rel=1e-12)
 
 
 def test_legs_are_inside_cones_by_the_angles_of_the_limits(tmp_path: Path) -> None:
@@ -163,7 +181,7 @@ def test_legs_are_inside_cones_by_the_angles_of_the_limits(tmp_path: Path) -> No
     close(stated, angles, 1e-7)
 
 
-@pytest.mark.parametrize("name", soaked(LIVE, FEW))
+@pytest.mark.parametrize("name", soaked(LIVE, [*FEW, "pose for each task"]))
 def test_optimum_is_that_of_solve(name: str, tmp_path: Path) -> None:
     given = made(name)
     # C has the limits over a workspace or along a path only at the stated poses.

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from builders import Run, assert_words, saved, soaked
 from pages import Page
+from test_changes import SECTION_4_3, read
 
 from screwsynth.nlp import load_case, shipped_cases, solve
 from screwsynth.nlp.evidence.evaluation import starting_point
@@ -142,7 +143,7 @@ def test_evaluation_shows_violated_limits(live: Callable[..., Live]) -> None:
 
 @needs_compiler
 @pytest.mark.browser
-@pytest.mark.parametrize("case", soaked([*shipped_cases()], ["paper-4.1-helical", "reachy-mini"]))
+@pytest.mark.parametrize("case", soaked([*shipped_cases()], ["fixture-pins", "paper-4.1-helical", "reachy-mini"]))
 def test_a_state_goes_out_and_comes_back(live: Callable[..., Live], cli: Run, tmp_path: Path, case: str) -> None:
     page = live(case)
     if not page.chrome.execute_script("return document.documentElement.classList.contains('live')"):
@@ -469,6 +470,42 @@ def copied_case(page: Live, folder: Path) -> str:
     file = folder / "copied.toml"
     file.write_text(page.copied("copy-case"), encoding="utf-8")
     return str(file)
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_chosen_task_shows_its_robot(live: Callable[..., Live], tmp_path: Path) -> None:
+    page = live(str(saved(tmp_path / "settings.toml", SECTION_4_3)))
+    best = solve(read(SECTION_4_3)).combination
+    assert best is not None
+    assert pytest.approx(best.value, rel=1e-6) == page.F
+    assert_words(*page.shown("F"), "worst-case")
+    rates = "const { state } = screwsynth, [first, size] = state.data.blocks.rates;"
+    rates += " return [...state.module.arrays.view.slice(first, first + size)]"
+    shown = "return [...document.querySelectorAll('.slider')].filter((each) => !each.hidden)"
+    shown += ".map((each) => each.querySelector('label').textContent)"
+    before = page.chrome.execute_script(rates)
+    assert "pose1_p_x" in page.chrome.execute_script(shown)
+    page.chrome.execute_async_script(
+        "const done = arguments[0], choice = document.getElementById('pose'); choice.value = '1';"
+        "choice.dispatchEvent(new Event('change'));"
+        "requestAnimationFrame(() => requestAnimationFrame(() => done(true)));"
+    )
+    after = page.chrome.execute_script(rates)
+    assert (len(before), len(after)) == (6, 6)
+    assert before != after
+    names = page.chrome.execute_script(shown)
+    assert "pose2_p_x" in names
+    assert "pose1_p_x" not in names
+    # The squared rates of a task are its F, at the optimum the worst case times the weight.
+    weights = read(SECTION_4_3).tasks
+    total = sum(task.weight for task in weights)
+    scaled = [
+        sum(rate**2 for rate in each) * total / 2 / task.weight
+        for each, task in zip((before, after), weights, strict=True)
+    ]
+    assert min(scaled) == pytest.approx(page.F, rel=1e-6)
+    assert page.faults == []
 
 
 @needs_compiler

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 
+from ....models import Parameter
 from ...case.case import Case
+from ...case.names import name_of_task
+from ...case.toml import toml_lines
 from ...errors import CaseError
 
 #: Sections of a case file that do not belong to another point.
 _DROPPED = ("expect", "published")
 #: Values of a task that a page can change.
 TASK_KEYS = ("axis", "point", "pitch")
+#: Table of a pose that is set for every task.
+_COMMON_POSE = re.compile(r'^\[pose\]\n(?:(?!\[).*\n)*?per = "task"\n', re.MULTILINE)
 _NUMBER = r"[-+]?[0-9.]+(?:e[-+]?\d+)?"
 
 
@@ -39,7 +44,7 @@ def case_parts(case: Case, limits: Collection[str], *, has_weights: bool = False
     except CaseError:
         return []
     found: list[str | SetPart] = []
-    for part in _parts(case, text, limits, has_weights=has_weights):
+    for part in _parts(case, _with_each_pose(case, text), limits, has_weights=has_weights):
         if isinstance(part, str) and found and isinstance(found[-1], str):
             found[-1] += part
         else:
@@ -57,9 +62,19 @@ def stated_tasks(case: Case) -> list[dict[str, Any]]:
     return [each if {"axis", "pitch"} <= each.keys() else {} for each in found]
 
 
+def _with_each_pose(case: Case, text: str) -> str:
+    """Return a text of :meth:`.Case.to_toml` in which every task has a table for its pose."""
+    found = _COMMON_POSE.search(text)
+    if found is None or not case.pose_per_task:
+        return text
+    lines = found[0].removeprefix("[pose]\n").replace('per = "task"\n', "").strip("\n")
+    tables = [f"[[pose]]\n{lines}\n{toml_lines({'task': task.name})[0]}\n" for task in case.tasks]
+    return f"{text[: found.start()]}{chr(10).join(tables)}{text[found.end() :]}"
+
+
 def _parts(case: Case, text: str, limits: Collection[str], *, has_weights: bool) -> Iterator[str | SetPart]:
     """Yield the parts of a text of :meth:`.Case.to_toml`."""
-    names = {item.name: case.component_names(item) for item in case.model.parameters}
+    names = {item.name: _names(case, item) for item in case.model.parameters}
     tasks = stated_tasks(case)
     section, pose, task, is_dropped = "", -1, -1, False
     for line in text.splitlines(keepends=True):
@@ -75,7 +90,7 @@ def _parts(case: Case, text: str, limits: Collection[str], *, has_weights: bool)
         if equals and section == "robot.parameters" and key in names:
             yield from _assigned(line, names[key])
         elif equals and section == "pose" and key == "position":
-            yield from _assigned(line, tuple(f"{case.pose_prefixes[pose]}p_{letter}" for letter in "xyz"))
+            yield from _assigned(line, [[f"{case.pose_prefixes[pose]}p_{letter}"] for letter in "xyz"])
             yield from _rotation(case, pose)
         elif equals and section == "pose" and key == "rotation":
             continue
@@ -111,12 +126,23 @@ def _task(line: str, key: str, name: str, stated: Collection[str], weight: float
         yield "\n"
 
 
-def _assigned(line: str, names: tuple[str, ...]) -> Iterator[str | SetPart]:
-    """Yield a line with values in place of its own: a number, or a list of them."""
+def _names(case: Case, item: Parameter) -> list[list[str]]:
+    """Return the names of the values of each component of a parameter: several if it changes from task to task."""
+    own, tasks = case.dimensions_per_task, range(len(case.tasks))
+    named = zip(item.components, case.component_names(item), strict=True)
+    return [[name_of_task(name, k) for k in tasks] if key in own else [name] for key, name in named]
+
+
+def _assigned(line: str, names: Sequence[Sequence[str]]) -> Iterator[str | SetPart]:
+    """Yield a line with values in place of its own: a number, or a list of them; each may have a value for each task."""
     yield f"{line.partition(' = ')[0]} = {'[' if len(names) > 1 else ''}"
-    for k, name in enumerate(names):
+    for k, several in enumerate(names):
         yield ", " if k else ""
-        yield {"set": name}
+        yield "{ tasks = [" if len(several) > 1 else ""
+        for j, name in enumerate(several):
+            yield ", " if j else ""
+            yield {"set": name}
+        yield "] }" if len(several) > 1 else ""
     yield "]\n" if len(names) > 1 else "\n"
 
 

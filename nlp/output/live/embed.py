@@ -54,9 +54,9 @@ def live_view_of(solution: Solution, command: str) -> LiveView:
         command: name of the case on the command line.
     """
     case = solution.chosen_case
-    if case.changes:
-        fault = "a live view shows one robot for all tasks, and this one changes from task to task"
-        return LiveView(tag("p", f"This page has no sliders: {fault}.", class_="note"), is_live=False)
+    if solution.case.over_path is not None:
+        words = "This page has no sliders: its robot changes along the path."
+        return LiveView(tag("p", words, class_="note"), is_live=False)
     try:
         source = view_source(case)
     except CaseError as error:

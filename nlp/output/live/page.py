@@ -20,6 +20,7 @@ from ...case.case import Case
 from ...errors import EvaluationError, InputError
 from ...evidence.evaluation import starting_point
 from ...evidence.state import evaluate
+from ...program.formulation import formulate
 from ...program.nlp import Nlp
 from ...program.places import FreeRotation
 from ...results.data import SolveResult
@@ -189,7 +190,6 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
         "prefixes": list(case.pose_prefixes),
         "track": None if track is None else track.data,
         "recorded": _recorded(nlp, x, is_needed=track is None and (bool(fault) or not _has_free_turns(nlp))),
-        "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
     return LiveParts(
         style=Markup(_file("live.css")),
@@ -236,7 +236,7 @@ def _answer(solution: Solution) -> dict[str, Any]:
     """Return the program's answer: point, words of the terminal's headline, and whether it is an optimum."""
     combination = solution.combination
     own = solution.outcomes[0].own if combination is None else combination.combined
-    x = solution.outcomes[0].x if own is None else own.x
+    x = solution.x if own is None else own.x
     result = result_of(solution)
     words = headline(result, solution.case).words if isinstance(result, SolveResult) else _combined_words(solution)
     return {"x": x.tolist(), "words": words, "isOptimum": solution.status.is_answer}
@@ -306,11 +306,20 @@ def _recorded(nlp: Nlp, x: FloatArray, *, is_needed: bool) -> list[dict[str, Any
         if not is_needed or not task.is_stated:
             found.append(None)
             continue
-        drawing = drawing_of(nlp, x, evaluate(nlp, x), k)
+        drawing = _drawing_of_task(nlp, x, k)
         postures, zero = postures_along_motion(drawing, _RECORDED)
         values = [_drawn_values(each.posture, drawing.size) for each in postures]
         found.append({"zero": zero, "frames": values} if len(values) > 1 else None)
     return found
+
+
+def _drawing_of_task(nlp: Nlp, x: FloatArray, task: int) -> Drawing:
+    """Return the robot at the first pose of a task."""
+    if not nlp.case.changes:
+        return drawing_of(nlp, x, evaluate(nlp, x), task)
+    own, places = formulate(nlp.case, task), nlp.program.places
+    at = x[places.of_task(task, len(places.owners))]
+    return drawing_of(own, at, evaluate(own, at))
 
 
 def _drawn_values(posture: Posture, size: float) -> list[float]:
@@ -341,10 +350,12 @@ def _view(source: ViewSource, x: FloatArray) -> list[float]:
 def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
     """Return the picture and the controls."""
     stated = drawing.case is not None and case.tasks[0].is_stated
-    choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
+    choices = [("rate 0", "rate of the shown task")] if case.changes and stated else []
+    if not case.changes:
+        choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
     choices += [(f"force {k}", f"actuator force, {name}") for k, name in enumerate(data["loads"])]
     options = [tag("option", words, value=value) for value, words in choices or [("rate 0", "rate")]]
-    poses = [tag("option", f"pose {k + 1}", value=k) for k in range(data["poses"])]
+    poses = [tag("option", words, value=k) for k, words in enumerate(_pose_words(data))]
     words = "Robot in three dimensions. Arrow keys turn it, plus and minus zoom, 0 resets the view."
     picture = tag(
         "figure",
@@ -363,6 +374,19 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
         id="picture",
     )
     return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
+
+
+def _pose_words(data: ViewData) -> list[str]:
+    """Return the name of each pose: that of its task, if dimensions or the pose change from task to task."""
+    tasks = data["pose_tasks"]
+    if not tasks:
+        return [f"pose {k + 1}" for k in range(data["poses"])]
+    names = [data["tasks"][task]["name"] for task in tasks]
+    if len(set(tasks)) == len(tasks):
+        return names
+    return [
+        f"{name}, pose {tasks[: k + 1].count(task)}" for k, (name, task) in enumerate(zip(names, tasks, strict=True))
+    ]
 
 
 def _players(case: Case) -> Iterable[Markup]:

@@ -32,8 +32,11 @@ _COLOURS = ("#08519c", "#b34700", "#00703c")
 def schedule_figure(case: Case, solution: Solution) -> Figure | None:
     """Return the maps of the settings and their rates as a Matplotlib figure; None without a schedule."""
     schedule = solution.schedule
-    if schedule is None or not schedule.names:
-        return None
+    return None if schedule is None or not schedule.names else figure_of_schedule(case, schedule)
+
+
+def figure_of_schedule(case: Case, schedule: Schedule) -> Figure:
+    """Return the maps of the settings and their rates as a Matplotlib figure; the schedule has a setting."""
     problem, units = schedule_problem(case), schedule.units
     d = np.array([units.to_internal(schedule.design[each.name], each.dimension) for each in problem.design])
     unit = np.array([units.to_internal(1.0, each) for each in schedule.dimensions])

@@ -28,6 +28,8 @@ from ...words.numbers import number
 from ...words.objective import objective_label
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.posture import states_at_poses, worst_pose
+from ..pictures.figures import picture_of
+from ..pictures.schedules import figure_of_schedule
 from .frames import PoseView, ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
@@ -80,6 +82,7 @@ class Report:
         is_answer: True if the point is an optimum of the case.
         refusal: reason why a requested certificate is impossible; empty otherwise.
         curves: trade-offs over the active limits, shown instead of slices; empty for slices.
+        schedule: SVG picture of the schedule; empty without values that change along the path.
     """
 
     case: Case
@@ -91,6 +94,7 @@ class Report:
     is_answer: bool
     refusal: str = ""
     curves: tuple[TradeoffResult, ...] = ()
+    schedule: bytes = b""
 
     @property
     def is_enclosed(self) -> bool:
@@ -125,7 +129,10 @@ def report_of(
         _part(outcome, outcome.at, j, len(solution.outcomes), is_answer=is_answer)
         for j, outcome in enumerate(solution.outcomes)
     )
-    return Report(solution.case, text, result, parts, combined, check, is_answer, refusal)
+    schedule, picture = solution.schedule, b""
+    if schedule is not None and schedule.names:
+        picture = picture_of(".svg", figure_of_schedule, solution.case, schedule)
+    return Report(solution.case, text, result, parts, combined, check, is_answer, refusal, schedule=picture)
 
 
 def _part(outcome: TaskOutcome, x: FloatArray, task: int, tasks: int, *, is_answer: bool) -> Part:

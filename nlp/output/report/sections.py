@@ -31,11 +31,13 @@ from ...words.numbers import number
 from ...words.objective import objective_words
 from ...words.path import along_table, path_proof_lines
 from ...words.robot import combined_design_table, robot_tables, solved_design_table
+from ...words.schedule import no_schedule_line, schedule_lines, schedule_table
 from ...words.tables import active_table, limit_table, limits_title, margin_table, origin_table, outcome_table
+from ...words.text import Line, TextTable
 from ...words.workspace import proof_lines, proof_tables
 from .charts import Curve, Spot, line_chart
 from .exploration import optima, surroundings
-from .markup import Markup, join_markup, paragraphs, tag
+from .markup import Markup, image_source, join_markup, paragraphs, tag
 from .report import Report
 from .robotview import robot_section
 from .tables import html_table
@@ -163,15 +165,18 @@ def sections(report: Report, *, is_live: bool = False) -> list[tuple[str, str, M
     The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the
     data to repeat the solve. A live view replaces the 3-D view.
     """
+    # The robot of a schedule is that at the first point of the path.
+    first = "" if report.case.over_path is None else " at the first point of the path"
     return [
         ("case", "Problem", _case(report)),
-        ("robot", "Robot and task motion", robot_section(report, is_live=is_live)),
-        ("result", "Result", _result(report)),
+        ("schedule", "Schedule along the path", _schedule(report)),
+        ("robot", f"Robot and task motion{first}", robot_section(report, is_live=is_live)),
+        ("result", f"Result{first}", _result(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
         ("certificate", "Certificate of the global optimum", certificate_section(report)),
         ("workspace", "Proof over the workspace", workspace_section(report)),
         ("path", "Proof along the path", path_section(report)),
-        ("limits", "Limits and margins", _limits(report)),
+        ("limits", f"Limits and margins{first}", _limits(report)),
         ("optima", "Local optima", optima(report)),
         ("around", "F near the design", surroundings(report)),
         ("published", "Comparison with published values", published_section(report)),
@@ -183,7 +188,7 @@ def answer(report: Report) -> Markup:
     """Return the result for the top of the page, or the status of a solve without an optimum."""
     result = report.result
     if isinstance(result, SolveResult):
-        lines = [headline(result, report.case).words]
+        lines = [headline(result, report.case).words] if report.case.over_path is None else _schedule_answer(report)
     else:
         combined = result.combined
         value = "" if combined.value is None else f", value {number(combined.value)}"
@@ -200,6 +205,33 @@ def answer(report: Report) -> Markup:
     return tag("div", paragraphs(lines), class_=kind, id="answer")
 
 
+def _schedule_answer(report: Report) -> list[str]:
+    """Return the objective over the path with its gain, or that no schedule was found."""
+    result = report.result
+    if isinstance(result, CombinedResult) or result.schedule is None:
+        return [no_schedule_line(report.case).words]
+    first = next(each for each in schedule_lines(report.case, result.schedule) if isinstance(each, Line))
+    return [f"{first.words}{first.after}"]
+
+
+def _schedule(report: Report) -> Markup:
+    """Return the schedule: its evidence, map and rates, and its points; empty without a schedule."""
+    result = report.result
+    if isinstance(result, CombinedResult) or result.schedule is None:
+        return Markup("")
+    found = [*schedule_lines(report.case, result.schedule)]
+    parts = [paragraphs(each for each in found if isinstance(each, Line))]
+    if report.schedule:
+        names = ", ".join(result.schedule.names)
+        words = f"Objective over the path and {names}, with the schedule and the best constant. Below: rates."
+        image = tag("img", src=image_source(report.schedule), alt=words)
+        parts.append(tag("figure", image, tag("figcaption", words)))
+    parts += [html_table(each, each.name.capitalize()) for each in found if isinstance(each, TextTable)]
+    if result.schedule.names:
+        parts.append(html_table(schedule_table(result.schedule), "Points of the path", id="points"))
+    return join_markup(parts)
+
+
 def _objective_lines(case: Case) -> Iterator[str]:
     """Yield the objective: F of each task, or a quantity of the actuators."""
     measured = objective_words(case)
@@ -209,7 +241,10 @@ def _objective_lines(case: Case) -> Iterator[str]:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        yield f"Task “{task.name}”: F {word} for a {task_words(task_data(case, k), case.units)}."
+        motion = (
+            f"motion that follows the {task.follows}" if task.follows else task_words(task_data(case, k), case.units)
+        )
+        yield f"Task “{task.name}”: F {word} for a {motion}."
     yield "F is the sum of the squared rates at which the limbs' unit wrenches do work in the task's motion."
 
 
@@ -243,6 +278,8 @@ def _case(report: Report) -> Markup:
         turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
         if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
             lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
+    elif case.settings:
+        lines.append(f"Settings that change along the path: {', '.join(case.settings)}.")
     else:
         lines.append("No variables: the robot is evaluated at the stated dimensions and pose.")
     if case.changes:

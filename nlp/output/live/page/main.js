@@ -46,7 +46,8 @@ const limbValues = (view) => {
       take(each.limb, Math.abs(high) >= Math.abs(low) ? high : low);
     });
   } else {
-    const [first] = data.blocks.rates, tasks = data.tasks.length;
+    // The robot of a task has the rates of this task only.
+    const [first] = data.blocks.rates, tasks = data.pose_tasks.length ? 1 : data.tasks.length;
     data.row_limbs.forEach((/** @type {string} */ limb, /** @type {number} */ k) => take(limb, view[first + k * tasks + Number(index)]));
   }
   const most = Math.max(...[...found.values()].map(Math.abs), 1e-300);
@@ -67,7 +68,8 @@ const draw = () => {
   const view = player?.view ?? (state ? state.module.arrays.view : data.view);
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
   const p = state ? state.module.arrays.p : data.p;
-  const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
+  const coloured = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
+  const task = data.pose_tasks[state?.pose ?? 0] ?? coloured;
   const twist = data.is_stated && !track ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
   if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];

@@ -74,7 +74,8 @@ export class Player {
 
   /** Recorded positions of a task. @param {number} task @returns {Recorded | null} */
   recorded(task) {
-    return this.data.recorded[task] ?? null;
+    // Without a module, the page shows the robot of the first task only.
+    return this.state || task === 0 || !this.data.pose_tasks.length ? (this.data.recorded[task] ?? null) : null;
   }
 
   /** @param {number} task @returns {number[]} */
@@ -100,6 +101,13 @@ export class Player {
   start(task) {
     this.stop();
     this.task = task;
+    // The robot of a task has its own pose and settings.
+    const own = this.data.pose_tasks.indexOf(task), choice = /** @type {HTMLSelectElement | null} */ (document.getElementById("pose"));
+    if (this.state && own >= 0 && this.data.pose_tasks[this.state.pose] !== task) {
+      this.state.pose = own;
+      if (choice) choice.value = String(own);
+      this.state.look();
+    }
     this.begin = performance.now();
     if (this.canFollow(task)) this.measure();
     else this.ends = [-1, 1];

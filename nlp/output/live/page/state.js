@@ -440,9 +440,9 @@ export class State {
 
   /** F at the point; 0 where it is rounding error of its terms, as in the terminal. */
   shownF() {
-    const { F, view, p } = this.module.arrays, [first] = this.data.blocks.magnitude, { tasks, poses } = this.data;
+    const { F, view, p } = this.module.arrays, [first] = this.data.blocks.magnitude, { tasks, poses, pose_tasks } = this.data;
     if (this.fault & 3) return NaN;
-    const terms = tasks.map((/** @type {{ weight: number }} */ task, /** @type {number} */ k) => view[first + k] * (task.weight < 0 ? 1 : Math.abs(p[task.weight])));
+    const terms = tasks.map((/** @type {{ weight: number }} */ task, /** @type {number} */ k) => view[first + (pose_tasks.length ? 0 : k)] * (task.weight < 0 ? 1 : Math.abs(p[task.weight])));
     const size = poses * terms.reduce((/** @type {number} */ sum, /** @type {number} */ each) => sum + each, 0);
     return Math.abs(F[0]) <= ZERO_F * size ? 0 : F[0];
   }
