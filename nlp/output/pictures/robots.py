@@ -70,7 +70,7 @@ def robots_figure(designs: Designs[Row]) -> Figure:
 
 
 def robot_pictures(designs: Designs[Row]) -> list[bytes]:
-    """Return an SVG picture of each robot with a scale bar, and last a picture of the common legend.
+    """Return an SVG picture of each robot with a scale bar, and last the common legend for a wide and a narrow page.
 
     Raises:
         EvaluationError: no robot has an optimum at which it exists.
@@ -84,12 +84,13 @@ def robot_pictures(designs: Designs[Row]) -> list[bytes]:
         _draw_length(figure, 0.15, designs, scale)
         return figure
 
-    def legend() -> Figure:
-        figure = _empty(_LEAST, _FOOT)
-        _draw_legend(figure, pairs, scale, 0.15 / _LEAST)
+    def legend(width: float) -> Figure:
+        figure = _empty(width, _FOOT)
+        _draw_legend(figure, pairs, scale, 0.15 / width)
         return figure
 
-    return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
+    legends = (picture_of(".svg", legend, width) for width in (_LEAST, _WIDTH))
+    return [*(picture_of(".svg", panel, pair) for pair in pairs), *legends]
 
 
 def _pairs(designs: Designs[Row]) -> list[_Pair]:
