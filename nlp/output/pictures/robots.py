@@ -30,6 +30,8 @@ _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
 _ROW = _HEIGHT + _HEADING
 #: Least width of the figure, heights of its title and of scales and legend, inches.
 _LEAST, _TITLE, _FOOT = 6.6, 0.4, 1.65
+#: Width of a legend's handle with the room around it, and mean width of a letter of the legend, inches.
+_HANDLE, _LETTER = 0.7, 0.067
 #: Largest length of the scale bar, as a fraction of a panel's width.
 _BAR = 0.4
 
@@ -154,7 +156,9 @@ def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: fl
         place = (left, (_FOOT - 0.35) / height, 0.5, 0.14 / height)
         add_colour_bar(figure, place, pairs[0].drawing, scale.largest, "horizontal")
     columns = max(1, min(len(symbols), int(width / 1.5)))
-    add_legend(figure, 0.15 / width, 0.5 / height, [(handle, text) for text, handle in entries.items()])
+    letters = int((width - _HANDLE) / _LETTER)
+    wrapped = [(handle, textwrap.fill(text, letters)) for text, handle in entries.items()]
+    add_legend(figure, 0.15 / width, 0.5 / height, wrapped)
     add_legend(figure, 0.15 / width, 0.1 / height, [(handle, text) for text, handle in symbols.items()], columns)
 
 
