@@ -17,6 +17,7 @@ from ..results.objective import unit_of_objective
 from ..results.point import head_data, stated_pose_notice, versions
 from ..system.jsonvalues import finite_or_none
 from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, DrawnDesign, Join, PageWords, design_values
+from ..words.numbers import key_words
 from ..words.text import Line
 from .front import Front, FrontPoint
 from .goals import Goal
@@ -203,8 +204,8 @@ def _drawn(front: Front, point: FrontPoint) -> DrawnDesign:
     names = design_names(solution.nlp.program)
     sides = () if solution.evidence is None else solution.evidence.active
     return DrawnDesign(
-        ", ".join(f"{_quantity(goal)} = {value:.6g}{unit}" for goal, value, unit in pairs),
-        f"optimum of {_quantity(front.goals[point.program.optimised])}",
+        ", ".join(f"{_shown(goal)} = {value:.6g}{unit}" for goal, value, unit in pairs),
+        f"optimum of {_shown(front.goals[point.program.optimised])}",
         design_values(solution.nlp, solution.x),
         tuple(f"{side.name} {side.bound}" for side in sides if side.name in names),
         solution.nlp,
@@ -235,6 +236,11 @@ def _words(goal: Goal) -> str:
 def _quantity(goal: Goal) -> str:
     """Return the quantity of a goal in words, such as ``F of drive`` for ``F:drive``."""
     return goal.label.removeprefix("limits.") if goal.task is None else goal.label.replace("F:", "F of ", 1)
+
+
+def _shown(goal: Goal) -> str:
+    """Return the quantity of a goal for a page, with the key of a limit in words."""
+    return key_words(_quantity(goal)) if goal.task is None else _quantity(goal)
 
 
 def _point(front: Front, point: FrontPoint) -> FrontPointData:

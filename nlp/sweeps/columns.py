@@ -25,7 +25,7 @@ from ..results.tradeoff import unit_of_number
 from ..system.journal import fields_of
 from ..system.jsonvalues import finite_or_none, vector
 from ..words.designs import SEPARATOR, Cell, Column, ColumnKind, Designs, Join, PageWords
-from ..words.numbers import number
+from ..words.numbers import key_words, number
 from ..words.tables import sizes_of_variables
 from ..words.text import Line
 from .journal import Row
@@ -126,7 +126,7 @@ def sweep_designs(sweep: Sweep, rows: Sequence[Row]) -> Designs[Row]:
         rows,
         Join.GRID if is_drawn(sweep.points) else Join.CLOUD,
         PageWords(
-            f"{case.name}, robot {case.model.name}, over {', '.join(sweep.points.names)}",
+            f"{case.name}, robot {case.model.name}, over {', '.join(map(key_words, sweep.points.names))}",
             f"{words}, {proved:,} of them with a certificate." if any(row.certificate for row in rows) else f"{words}.",
             ("curve", "F over the points"),
             ("values", "All points"),

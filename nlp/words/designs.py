@@ -15,7 +15,7 @@ from ..program.program import design_indices
 from ..results.data import CertificateData
 from ..results.rounding import FLAT
 from ..system.csvtext import csv_text
-from .numbers import number
+from .numbers import key_words, number
 from .text import Line, TextTable
 
 #: Separator of several values in a cell of CSV.
@@ -71,8 +71,9 @@ class Column(Generic[Row]):
 
     @property
     def axis(self) -> str:
-        """Label with unit, for an axis of a picture."""
-        return f"{self.label}, {self.unit}" if self.unit else self.label
+        """Label in words, with unit, for an axis of a picture."""
+        words = key_words(self.label)
+        return f"{words}, {self.unit}" if self.unit else words
 
 
 class DrawnDesign(NamedTuple):

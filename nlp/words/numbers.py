@@ -19,6 +19,9 @@ _RESIDUAL = 1e-12
 _SOLVED = 9
 #: Sense of a force and its load in the name of a limited quantity, up to the pose.
 _LOADED = re.compile(r" (?:(backwards|smallest) )?load (.+?)(?=(?:, other sense)?(?: pose \d+)?$)")
+#: Key of a limit or a setting, and words for ends of a range.
+_KEY = re.compile(r"(?<![\w.])(?:(?:limits|task)(?:\.[a-z]\w*)+|[a-z]\w*(?:\.[a-z]\w*)*\.(?:min|max)\b)")
+_ENDS = {"min": "minimum", "max": "maximum"}
 _SENSES = {None: "", "backwards": ", negative force", "smallest": ", smallest force"}
 
 
@@ -62,6 +65,21 @@ def quantity_words(name: str) -> str:
     "cutting"``: results in JSON and proof records contain the name unchanged.
     """
     return _LOADED.sub(lambda found: f"{_SENSES[found[1]]}, {load_words(found[2])}", name)
+
+
+def key_words(text: str) -> str:
+    """Return a text with the keys of limits and settings in words, such as ``maximum leg length``.
+
+    ``limits.leg_length.max`` becomes ``maximum leg length``, and ``limits.footprint.base`` becomes ``footprint base``.
+    Other names, such as ``x1``, stay as they are.
+    """
+    return _KEY.sub(_words_of_key, text)
+
+
+def _words_of_key(found: re.Match[str]) -> str:
+    *names, end = found[0].removeprefix("limits.").split(".")
+    words = " ".join(name.replace("_", " ") for name in names)
+    return f"{_ENDS[end]} {words}" if end in _ENDS else f"{words} {end.replace('_', ' ')}".strip()
 
 
 def residual(value: float) -> str:

@@ -21,7 +21,7 @@ from .designs import (
     drawn_task,
 )
 from .lines import title_line
-from .numbers import number, per_words
+from .numbers import key_words, number, per_words
 from .text import Line, Tone
 
 
@@ -46,7 +46,7 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
         result.points,
         Join.CURVE,
         PageWords(
-            f"{case.name}, robot {case.model.name}: {over}",
+            f"{case.name}, robot {case.model.name}: {key_words(over)}",
             f"{solved} of {len(result.points)} values have an answer",
             ("curve", "Trade-off curve"),
             ("values", "All values"),
@@ -133,7 +133,7 @@ def _drawn(result: TradeoffResult, found: Tradeoff) -> list[DrawnDesign]:
             of_each = (f"F of {name} = {each:.6g}" for name, each in zip(result.tasks, row.tasks, strict=True) if each)
             designs.append(
                 DrawnDesign(
-                    f"{result.over} = {row.value:.5g} {result.unit}".rstrip(),
+                    f"{key_words(result.over)} = {row.value:.5g} {result.unit}".rstrip(),
                     (F or ", ".join(of_each)) + drawn_task(point.solution.case),
                     design_values(point.solution.whole, point.solution.x),
                     tuple(each.removeprefix(LIMITS) for each in row.active),

@@ -113,8 +113,8 @@ def test_pictures_have_units_sizes_and_one_scale(path: str) -> None:
     legend = {text.get_text() for each in figure.legends for text in each.get_texts()}
     assert any(text.startswith("task: tilt (screw of pitch 3 mm") for text in legend)
     assert {"spherical (S)", "filled: actuated"} <= legend
-    # On a page each robot has a picture of its own, and the legend one.
-    assert len(robot_pictures(designs)) == 3
+    # On a page each robot has a picture of its own, and the legend one for wide and one for narrow windows.
+    assert len(robot_pictures(designs)) == 4
 
 
 def test_dimensions_ranges_and_certificates() -> None:

@@ -24,6 +24,7 @@ from screwsynth.nlp.evidence.tolerance import BuiltRobot
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.compromise import solution_of_one_task
 from screwsynth.nlp.solver.multistart import solve_program
+from screwsynth.nlp.words.numbers import key_words
 
 TABLES = tomllib.loads(find_case("hexapod-machining").read_text(encoding="utf-8"))
 
@@ -341,3 +342,18 @@ def test_the_result_says_what_was_rounded_and_lost(tmp_path: Path, cli: Run) -> 
     loss, before = (result["rounding"][key] for key in ("loss", "before"))
     assert before - result["F"] == pytest.approx(loss)
     assert result["rounding"]["relative_loss"] == pytest.approx(loss / before)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("limits.leg_length.max", "maximum leg length"),
+        ("smallest leg_length.max", "smallest maximum leg length"),
+        ("limits.footprint.base", "footprint base"),
+        ("task.pitch", "task pitch"),
+        ("x1", "x1"),
+        ("F of drill of 3.5 mm", "F of drill of 3.5 mm"),
+    ],
+)
+def test_keys_of_axes_and_headings_are_words(text: str, words: str) -> None:
+    assert key_words(text) == words

@@ -130,7 +130,15 @@ def test_three_goals_on_an_exact_front(tmp_path: Path, cli: Run) -> None:
     assert isinstance(result, FrontResult)
     assert [each.goals["F:x"] for each in result.points] == x.tolist()
     assert set(result.points[0].design) == {"p_x", "p_y", "p_z"}
-    assert files[2].read_text().count("<tr>") == 13
+    page = files[2].read_text()
+    assert page.count("<tr>") == 13
+    # The panels of the three pairs of goals are below each other in a narrow window.
+    pictures = re.search(r'<picture><source media="[^"]*" srcset="([^"]*)"><img src="([^"]*)"', page)
+    assert pictures is not None
+    narrow, wide = (ElementTree.fromstring(base64.b64decode(each.split(",")[1])) for each in pictures.groups())
+    narrow_size, wide_size = ([float(each.attrib[key][:-2]) for key in ("width", "height")] for each in (narrow, wide))
+    assert narrow_size[0] < narrow_size[1]
+    assert wide_size[0] > wide_size[1]
 
 
 def test_two_limits_as_goals(tmp_path: Path) -> None:
@@ -352,19 +360,21 @@ def test_a_tradeoff_shows_each_design_and_where_the_curve_bends(tmp_path: Path, 
     figures = figures_of(text)
     assert len(figures) == len(points) == 3
     for point, (words, picture) in zip(points, figures, strict=True):
-        assert f"{LIMIT} = {point['value']:.5g} in" in words
+        assert f"maximum leg length = {point['value']:.5g} in" in words
         assert f"F = {point['F']:.6g}" in words
         assert f"x2 = {point['parameters']['x2']:.5g}" in words
         # The robot has six limbs in each picture, which has no words.
         names = [each.get("id", "") for each in picture.iter()]
         assert {f"limb {k}{side}" for k in (1, 2, 3) for side in "+-"} <= set(names)
-        assert not [name for name in names if name.startswith("text_")]
+        assert not [name for name in names if name.startswith(("text_", "velocity", "frame", "path"))]
     lines = re.findall("<li>(.*?)</li>", text[text.index('id="bends"') :].split("</ul>")[0])
     changed = [(a["value"], b["value"]) for a, b in itertools.pairwise(points) if set(a["active"]) != set(b["active"])]
     assert changed
     assert len(lines) == len(changed) == text.count('class="bound"')
     for line, (before, after) in zip(lines, changed, strict=True):
-        assert line.startswith(f"Between {LIMIT} = {before:.5g} in and {LIMIT} = {after:.5g} in: ")
+        assert line.startswith(
+            f"Between maximum leg length = {before:.5g} in and maximum leg length = {after:.5g} in: "
+        )
 
 
 def test_all_designs_have_one_scale(tmp_path: Path, cli: Run) -> None:

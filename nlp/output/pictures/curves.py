@@ -73,17 +73,23 @@ def lines_figure(designs: Designs[Row]) -> Figure:
 _FRONT_SIZE = (6.4, 5.0)
 #: Width and height of the panel of a pair of goals, inches, and number of panels in a row.
 _PANEL, _ACROSS = (4.6, 3.7), 3
+#: Width and height of a panel on a narrow page, inches.
+_NARROW_PANEL = (4.0, 3.2)
 
 
-def goals_figure(designs: Designs[Row]) -> Figure:
+def goals_figure(designs: Designs[Row], *, is_narrow: bool = False) -> Figure:
     """Return one goal over the other as a Matplotlib figure; the line is interrupted at gaps of the front.
 
     More than two goals have a panel for each pair; with three goals, the colour shows the third.
+
+    Args:
+        designs: table of designs of a front.
+        is_narrow: If true, the panels are below each other.
     """
     goals = designs.of_kind(ColumnKind.OBJECTIVE)
     labels, values = [goal.axis for goal in goals], np.stack([numbers_of(goal, designs.rows) for goal in goals], axis=1)
     if len(goals) > 2:
-        return _pairs(labels, values, designs.title)
+        return _pairs(labels, values, designs.title, is_narrow=is_narrow)
     figure = Figure(figsize=_FRONT_SIZE, facecolor="white", layout="constrained")
     axes = figure.add_subplot()
     first = 0
@@ -96,12 +102,13 @@ def goals_figure(designs: Designs[Row]) -> Figure:
     return figure
 
 
-def _pairs(labels: list[str], values: FloatArray, title: str) -> Figure:
+def _pairs(labels: list[str], values: FloatArray, title: str, *, is_narrow: bool) -> Figure:
     """Return a panel for each pair of goals; with three goals, the colour of the points (n, k) shows the third."""
     pairs = list(combinations(range(len(labels)), 2))
-    across = min(len(pairs), _ACROSS)
+    across = 1 if is_narrow else min(len(pairs), _ACROSS)
     down = -(-len(pairs) // across)
-    figure = Figure(figsize=(across * _PANEL[0], down * _PANEL[1] + 0.4), facecolor="white", layout="constrained")
+    wide, high = _NARROW_PANEL if is_narrow else _PANEL
+    figure = Figure(figsize=(across * wide, down * high + 0.4), facecolor="white", layout="constrained")
     for place, (i, j) in enumerate(pairs, start=1):
         axes = figure.add_subplot(down, across, place)
         others = [k for k in range(len(labels)) if k not in (i, j)]

@@ -24,6 +24,8 @@ from .view import View, clearest_view
 _SIZE = (2.9, 2.6)
 #: Width and height of a chart on a narrow page, inches, and number of letters in a line of an axis label.
 _NARROW, _LETTERS = (4.0, 3.4), 38
+#: Largest number of goals with one panel.
+_ONE_PANEL = 2
 
 
 def page_figure(designs: Designs[Row], *, is_narrow: bool = False) -> Figure:
@@ -36,12 +38,14 @@ def page_figure(designs: Designs[Row], *, is_narrow: bool = False) -> Figure:
     Raises:
         EvaluationError: no design can be drawn.
     """
-    figure = designs_figure(designs, is_on_page=True)
+    figure = designs_figure(designs, is_on_page=True, is_narrow=is_narrow)
     for axes in figure.axes:
         axes.set_title("", loc="left")
     figure.suptitle("")
     if is_narrow:
-        figure.set_size_inches(*_NARROW)
+        goals = len(designs.of_kind(ColumnKind.OBJECTIVE))
+        if goals <= _ONE_PANEL or designs.of_kind(ColumnKind.VARIED):
+            figure.set_size_inches(*_NARROW)
         for axes in figure.axes:
             for label in (axes.xaxis.label, axes.yaxis.label):
                 label.set_text(textwrap.fill(label.get_text(), _LETTERS))
@@ -51,12 +55,13 @@ def page_figure(designs: Designs[Row], *, is_narrow: bool = False) -> Figure:
     return figure
 
 
-def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure:
+def designs_figure(designs: Designs[Row], *, is_on_page: bool = False, is_narrow: bool = False) -> Figure:
     """Return the picture of a table of designs as a Matplotlib figure.
 
     Args:
         designs: table of designs.
         is_on_page: If true, the page shows the sentences of :func:`legend_of`, and the picture does not.
+        is_narrow: If true, the panels of several goals are below each other.
 
     Raises:
         EvaluationError: no design can be drawn.
@@ -66,7 +71,7 @@ def designs_figure(designs: Designs[Row], *, is_on_page: bool = False) -> Figure
     if designs.join is Join.GRID:
         return regions_figure(designs, () if is_on_page else legend_of(designs))
     if not designs.of_kind(ColumnKind.VARIED):
-        return goals_figure(designs)
+        return goals_figure(designs, is_narrow=is_narrow)
     if designs.join is Join.CLOUD:
         raise EvaluationError("A picture needs a grid over one or two varied names")
     return lines_figure(designs)
@@ -80,7 +85,8 @@ def legend_of(designs: Designs[Row]) -> list[str]:
 def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
     """Return an SVG picture of each design of one robot, in order, with one view and one scale.
 
-    A picture shows the robot and the axis of its task; the colours of the limbs show their rates.
+    A picture shows the robot and the axis of its task, without frames and velocities; the colours of the limbs show
+    their rates.
     """
     view = clearest_view(*drawings)
     plain = [replace(each, free=(), reference=None, forces=None) for each in drawings]
@@ -92,7 +98,7 @@ def design_pictures(drawings: Sequence[Drawing]) -> list[bytes]:
 def _painted(drawing: Drawing, view: View) -> Figure:
     """Return the robot on axes that fill a figure."""
     figure = Figure(figsize=_SIZE, facecolor="white")
-    Panel(figure.add_axes((0, 0, 1, 1)), view, drawing).paint()
+    Panel(figure.add_axes((0, 0, 1, 1)), view, drawing, is_small=True).paint()
     return figure
 
 

@@ -68,6 +68,8 @@ class Panel:
         view: parallel projection.
         drawing: robot with its task.
         largest: rate at the ends of the colour scale; by default the largest rate of the robot.
+        is_small: If true, the picture has neither frames nor velocities nor the path of the task: in a small picture,
+            their arrowheads would cover the robot.
 
     Attributes:
         largest: rate at the ends of the colour scale, positive.
@@ -75,8 +77,10 @@ class Panel:
         symbols: handles and texts of the legend of joint symbols.
     """
 
-    def __init__(self, axes: Axes, view: View, drawing: Drawing, largest: float | None = None) -> None:
-        self.drawing = drawing
+    def __init__(
+        self, axes: Axes, view: View, drawing: Drawing, largest: float | None = None, *, is_small: bool = False
+    ) -> None:
+        self.drawing, self._is_small = drawing, is_small
         self.largest = largest or largest_rate(drawing) or 1.0
         self.legend: list[tuple[Artist, str]] = []
         self.symbols: list[tuple[Handles, str]] = []
@@ -90,7 +94,8 @@ class Panel:
         if drawing.reference is not None:
             self._paint_start(drawing.reference)
         self._paint_plate(Body.BASE)
-        self._paint_frame("O", np.zeros(3), np.eye(3))
+        if not self._is_small:
+            self._paint_frame("O", np.zeros(3), np.eye(3))
         for motion in drawing.free:
             self._paint_motion(motion, free=True)
         if drawing.motion is not None:
@@ -98,8 +103,9 @@ class Panel:
         self._paint_limbs()
         self._paint_plate(Body.PLATFORM)
         self._paint_joints()
-        self._paint_frame("P", posture.position, posture.rotation)
-        if drawing.rows:
+        if not self._is_small:
+            self._paint_frame("P", posture.position, posture.rotation)
+        if drawing.rows and not self._is_small:
             self._paint_couples()
             self._paint_velocities()
         if drawing.forces is not None:
@@ -236,7 +242,7 @@ class Panel:
         else:
             dashes = (0, (3, 2)) if free else "solid"
             self._canvas.line(motion.line, name, color=colour, linewidth=width, zorder=8, linestyle=dashes)
-        if not free and motion.has_path:
+        if not free and motion.has_path and not self._is_small:
             self._canvas.line(motion.path[:-2], "path", color=VELOCITY, linewidth=2.0, zorder=9)
             self._canvas.arrow(motion.path[-3], motion.path[-1], "path head", VELOCITY, 2.0, 9)
         if free:

@@ -30,6 +30,8 @@ _WIDTH, _HEIGHT, _HEADING, _ACROSS = 4.2, 4.2, 0.65, 3
 _ROW = _HEIGHT + _HEADING
 #: Least width of the figure, heights of its title and of scales and legend, inches.
 _LEAST, _TITLE, _FOOT = 6.6, 0.4, 1.65
+#: Width of a legend's handle with the room around it, and mean width of a letter of the legend, inches.
+_HANDLE, _LETTER = 0.7, 0.067
 #: Largest length of the scale bar, as a fraction of a panel's width.
 _BAR = 0.4
 
@@ -70,7 +72,7 @@ def robots_figure(designs: Designs[Row]) -> Figure:
 
 
 def robot_pictures(designs: Designs[Row]) -> list[bytes]:
-    """Return an SVG picture of each robot with a scale bar, and last a picture of the common legend.
+    """Return an SVG picture of each robot with a scale bar, and last the common legend for a wide and a narrow page.
 
     Raises:
         EvaluationError: no robot has an optimum at which it exists.
@@ -84,12 +86,13 @@ def robot_pictures(designs: Designs[Row]) -> list[bytes]:
         _draw_length(figure, 0.15, designs, scale)
         return figure
 
-    def legend() -> Figure:
-        figure = _empty(_LEAST, _FOOT)
-        _draw_legend(figure, pairs, scale, 0.15 / _LEAST)
+    def legend(width: float) -> Figure:
+        figure = _empty(width, _FOOT)
+        _draw_legend(figure, pairs, scale, 0.15 / width)
         return figure
 
-    return [*(picture_of(".svg", panel, pair) for pair in pairs), picture_of(".svg", legend)]
+    legends = (picture_of(".svg", legend, width) for width in (_LEAST, _WIDTH))
+    return [*(picture_of(".svg", panel, pair) for pair in pairs), *legends]
 
 
 def _pairs(designs: Designs[Row]) -> list[_Pair]:
@@ -153,7 +156,9 @@ def _draw_legend(figure: Figure, pairs: Sequence[_Pair], scale: _Scale, left: fl
         place = (left, (_FOOT - 0.35) / height, 0.5, 0.14 / height)
         add_colour_bar(figure, place, pairs[0].drawing, scale.largest, "horizontal")
     columns = max(1, min(len(symbols), int(width / 1.5)))
-    add_legend(figure, 0.15 / width, 0.5 / height, [(handle, text) for text, handle in entries.items()])
+    letters = int((width - _HANDLE) / _LETTER)
+    wrapped = [(handle, textwrap.fill(text, letters)) for text, handle in entries.items()]
+    add_legend(figure, 0.15 / width, 0.5 / height, wrapped)
     add_legend(figure, 0.15 / width, 0.1 / height, [(handle, text) for text, handle in symbols.items()], columns)
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from ...words.designs import Column, ColumnKind, Designs, Row
+from ...words.numbers import key_words
 from ...words.objective import objective_label
 from .charts import Curve, Spot, line_chart
 from .markup import Markup, tag
@@ -39,12 +40,13 @@ def _numbers(column: Column[Row], rows: Sequence[Row]) -> list[float]:
 def _chart(designs: Designs[Row], column: Column[Row], here: float | None) -> Markup:
     over, unit = _over(designs), f" {_over(designs).unit}" if _over(designs).unit else ""
     values, F = _numbers(over, designs.rows), _numbers(column, designs.rows)
+    varied = key_words(over.label)
     name = f"{column.series}: " if len(designs.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
     solved = [(value, each) for value, each in zip(values, F, strict=True) if math.isfinite(each)]
-    words = f"{name}no optimum for any value of {over.label} from {values[0]:.5g} to {values[-1]:.5g}{unit}."
+    words = f"{name}no optimum for any value of {varied} from {values[0]:.5g} to {values[-1]:.5g}{unit}."
     if solved:
         (first, F_first), (last, F_last) = solved[0], solved[-1]
-        words = f"{name}F is {F_first:.6g} at {over.label} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
+        words = f"{name}F is {F_first:.6g} at {varied} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
         missing = len(values) - len(solved)
         if missing:
             words += f" No optimum at {missing} of {len(values)} values."

@@ -21,6 +21,7 @@ from .markup import (
     image_source,
     join_markup,
     paragraphs,
+    picture_element,
     picture_figure,
     tag,
     whole_page,
@@ -84,10 +85,11 @@ def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     page = designs.page
     yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(designs)]))
     with suppress(EvaluationError):  # if no robot has an optimum
-        *robots, legend = map(image_source, robot_pictures(designs))
+        *robots, wide, narrow = robot_pictures(designs)
         alt = "Robot at its design; the values are in the table."
-        images = [tag("img", src=source, alt=alt) for source in robots]
-        shown = [tag("div", *images, class_="designs"), tag("img", src=legend, alt="Colour scale of the limb rates.")]
+        images = [tag("img", src=image_source(each), alt=alt) for each in robots]
+        legend = picture_element(wide, narrow, alt="Colour scale of the limb rates.")
+        shown = [tag("div", *images, class_="designs robots"), legend]
         yield (*page.picture, tag("figure", *shown, tag("figcaption", page.below)))
     details = []
     for each in designs.details:

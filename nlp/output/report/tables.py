@@ -76,7 +76,7 @@ def _table_element(content: _Content, caption: str, **attributes: object) -> Mar
 def _content(table: TextTable) -> _Content:
     """Return headers and rows, with units at their numbers and without columns that are equal in all rows."""
     headers = [header.replace("\n", ", ") for header in table.headers]
-    rows = [[cell.words if isinstance(cell, Line) else str(cell) for cell in row] for row in table.rows]
+    rows = [[_related(cell.words if isinstance(cell, Line) else str(cell)) for cell in row] for row in table.rows]
     above: list[str] = []
     at = headers.index("unit") if table.with_unit and "unit" in headers else None
     # A unit without a number in its row would be lost.
@@ -111,7 +111,15 @@ def _equal_words(header: str, text: str) -> str:
 
 def is_number(text: str) -> bool:
     """Return whether a text begins with a number, and has at most a unit after it."""
-    return _NUMBER.fullmatch(text.removeprefix("<= ").removeprefix(">= ")) is not None
+    return (
+        _NUMBER.fullmatch(text.removeprefix("\N{LESS-THAN OR EQUAL TO} ").removeprefix("\N{GREATER-THAN OR EQUAL TO} "))
+        is not None
+    )
+
+
+def _related(text: str) -> str:
+    """Return a text with the signs of its inequalities."""
+    return text.replace("<= ", "\N{LESS-THAN OR EQUAL TO} ").replace(">= ", "\N{GREATER-THAN OR EQUAL TO} ")
 
 
 def _aligned(texts: Sequence[str]) -> list[object]:
