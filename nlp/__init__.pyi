@@ -97,12 +97,12 @@ from .front.front import Front as Front
 from .front.front import FrontPoint as FrontPoint
 from .front.front import pareto as pareto
 from .front.goals import Goal as Goal
+from .output.live.embed import report as report
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
-from .output.report.webpage import report as report
 from .output.sweeptable import sweep as sweep
 from .path.options import PathOptions as PathOptions
 from .path.path import ProgrammedPath as ProgrammedPath

@@ -52,11 +52,11 @@ def check_settings(case: ScheduledCase) -> None:
             fault = f'{key} changes along the path, which needs over = "path" and as = "mean" or "worst"'
             raise CaseError("objective", fault)
     for index, task in enumerate(case.tasks):
-        if task.measure == LEG_LENGTH and case.over_path is not OverPoses.WORST:
-            raise CaseError("objective.minimise", 'needs over = "path" and as = "worst"', task.measure)
-        if task.measure not in ("", LEG_LENGTH) and case.over_path is not None:
-            fault = "must be 'leg_length' along a path, or left out for F"
-            raise CaseError("objective.minimise", fault, task.measure)
+        if task.measure == LEG_LENGTH and case.over_path is None:
+            raise CaseError("objective.minimise", 'needs over = "path" and as = "mean" or "worst"', task.measure)
+        if task.measure and task.follows:
+            fault = f"conflicts with objective.minimise = {task.measure!r}, which needs no motion; remove [[task]]"
+            raise CaseError(f"task[{index}].follows", fault, task.follows)
         if task.follows:
             _check_follows(case, f"task[{index}].follows", task.follows)
     if case.over_path is not None:

@@ -66,9 +66,7 @@ def _check_measure(task: Task, tasks: int, model: Model, loading: Loading) -> No
     if not task.measure:
         return
     key = "objective.minimise"
-    if task.measure == LEG_LENGTH:
-        return  # an objective along a path, checked with it
-    if task.measure not in MEASURES:
+    if task.measure not in (*MEASURES, LEG_LENGTH):
         raise CaseError(key, f"must be one of {listing([*MEASURES, LEG_LENGTH])}", task.measure)
     if tasks > 1:
         fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
@@ -76,6 +74,8 @@ def _check_measure(task: Task, tasks: int, model: Model, loading: Loading) -> No
     if task.sense is not Sense.MIN:
         fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'
         raise CaseError("task[0].sense", fault, "max")
+    if task.measure == LEG_LENGTH:
+        return  # an objective along a path, checked with it
     needs_loads, needs_motion = MEASURES[task.measure]
     if needs_loads and not loading.loads:
         raise CaseError(key, "needs a table [[load]] with a load on the platform", task.measure)

@@ -88,6 +88,23 @@ def squares_of(case: Case, forces: PosedForces) -> Iterator[Measured]:
                 yield Measured(f"{name} load {each.case.name}{sense}", factor * square[k])
 
 
+def signed_values(case: Case, forces: PosedForces) -> Iterator[Measured]:
+    """Yield the values of all actuators at a pose in both senses, in the case's unit: the largest one is the objective.
+
+    Unlike their squares, values are no larger than the objective, and their slopes do not vanish at 0.
+    """
+    measure = case.tasks[0].measure
+    for k, joint in enumerate(forces.joints):
+        name = f"{measure} actuator {joint.name}"
+        if measure == "actuator_speed":
+            yield Measured(name, forces.speeds[k] / case.units.to_internal(1.0, dimension_of_speed(joint)))
+            continue
+        factor = forces.speeds[k] if measure == "actuator_power" else SX(1)
+        for each in forces.cases:
+            yield Measured(f"{name} load {each.case.name}", factor * each.largest[k])
+            yield Measured(f"{name} load {each.case.name}{OTHER_SENSE}", -factor * each.smallest[k])
+
+
 def level_constraints(nlp: Nlp, forces: PosedForces, names: Collection[str], where: str) -> list[BoundedConstraint]:
     """Return the constraints by which the level of a program bounds actuator values at a further pose.
 

@@ -8,6 +8,7 @@ from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure
 from ..case.limits.objective import ObjectiveLimit
+from ..case.task import LEG_LENGTH
 from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
 from ..system.jsonvalues import Absent, JsonObject, finite_or_none
@@ -95,7 +96,8 @@ def _in_unit(case: Case, value: float) -> float:
 
 def _dimension(case: Case) -> Dimension:
     """Return the dimension of the actuator quantity that a case optimises."""
-    return dimension_of_measure(case.tasks[0].measure, driven_joints(case.model)[0])
+    measure = case.tasks[0].measure
+    return Dimension.LENGTH if measure == LEG_LENGTH else dimension_of_measure(measure, driven_joints(case.model)[0])
 
 
 def unit_of_objective(case: Case, task: int | None = None) -> str:

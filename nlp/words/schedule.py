@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..case.pose import OverPoses
 from ..case.task import LEG_LENGTH
+from ..results.objective import unit_of_objective
 from .numbers import number
 from .text import Line, TextTable, Tone
 
@@ -17,17 +18,19 @@ if TYPE_CHECKING:
 
 def objective_name(case: Case) -> str:
     """Return the name of the objective over the path."""
-    if case.tasks[0].measure == LEG_LENGTH:
-        return "longest leg"
-    return "mean F" if case.over_path is OverPoses.MEAN else "worst F"
+    measure, is_mean = case.tasks[0].measure, case.over_path is OverPoses.MEAN
+    if not measure:
+        return "mean F" if is_mean else "worst F"
+    name = "longest leg" if measure == LEG_LENGTH else f"largest {measure.replace('_', ' ')}"
+    return f"mean {name}" if is_mean else name
 
 
 def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTable]:
     """Yield the objective with its gain over the best constant, the bound, and the rates."""
     name, segments = objective_name(case), schedule.segments
     where = f"along {segments:,} segment{'s' * (segments != 1)}"
-    unit = f" {case.units.length}" if case.tasks[0].measure == LEG_LENGTH else ""
-    yield Line(f"{name} = {number(schedule.value)}{unit}", tone=Tone.ANSWER, after=f" {where} ({_gain(schedule)})")
+    unit = unit_of_objective(case) if case.tasks[0].measure else ""
+    yield Line(f"{name} = {number(schedule.value)}{f' {unit}' if unit else ''}", tone=Tone.ANSWER, after=f" {where} ({_gain(schedule)})")
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"
@@ -78,7 +81,7 @@ def schedule_table(schedule: ScheduleData) -> TextTable:
 def no_schedule_line(case: Case) -> Line:
     """Return the outcome of a search without an answer."""
     names = ", ".join(case.settings) or "design"
-    words = f"infeasible: no schedule of {names} within the limits and rates was found"
+    words = f"no schedule found: the search found no {names} within the limits and rates; this is no proof"
     return Line(words, tone=Tone.NO_ANSWER)
 
 

@@ -140,7 +140,7 @@ class _Enclosed:
         function = ca.Function("point", [own, s, point], [problem.objective, problem.limits])
         objective, limits = function.call(given)
         weighted = objective * ca.DM(problem.weights)
-        values = weighted if problem.is_worst else ca.sum1(weighted)
+        values = weighted if problem.is_worst or problem.has_levels else ca.sum1(weighted)
         self._problem, self._count = problem, values.numel()
         self._encloser = Encloser(z, ca.vertcat(values, limits))
 

@@ -26,6 +26,9 @@ _STAGES = 200
 _GRID, _FINEST = 401, 3201
 #: Number of grid steps that the rate allows between two points, at least: a coarser grid would freeze the setting.
 _STEPS = 4
+#: Largest number of combinations of several constant settings, of points at which they are compared, and distance of
+#: two kept ones as a part of the ranges.
+_COMBINED, _SAMPLED, _APART = 1600, 50, 0.2
 #: Values of points that violate a limit.
 _OUT = -math.inf
 
@@ -60,7 +63,8 @@ def grid_of(problem: ScheduleProblem, d: FloatArray, held: FloatArray, k: int, f
     """
     count, setting = len(problem.points), problem.settings[k]
     stages, size = _stages(problem, k, _STAGES if fine else _STAGES // 2)
-    size = size if fine else max(_GRID // 2, size // 4)
+    # Half of the values leave at least two steps of the grid within the rate: fewer may freeze the setting.
+    size = size if fine else max(_GRID // 2, size // 2)
     values = np.linspace(setting.lower, setting.upper, size)
     s = np.repeat(held[stages][:, None, :], size, axis=1)
     s[:, :, k] = values
@@ -215,8 +219,10 @@ def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, mos
         most: largest number of constants.
     """
     low, high, first = ends(problem.settings)
-    if len(first) != 1:
-        return [first, 0.5 * (low + high)] if len(first) else [first]
+    if not len(first):
+        return [first]
+    if len(first) > 1:
+        return _several_constants(problem, d, most)
     held = np.repeat(first[None], len(problem.points), axis=0)
     grid = grid_of(problem, d, held, 0, fine)
     means = grid.objective.min(axis=0) if problem.is_worst else grid.weights @ grid.objective
@@ -225,3 +231,30 @@ def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, mos
     peaks = np.flatnonzero((means >= left) & (means >= right) & np.isfinite(means))
     best = peaks[np.argsort(-means[peaks], kind="stable")][:most]
     return [np.array([grid.values[m]]) for m in best.tolist()] or [first]
+
+
+def _several_constants(problem: ScheduleProblem, d: FloatArray, most: int) -> list[FloatArray]:
+    """Return the first values of several settings, and the best constants of a grid that keep the limits.
+
+    Args:
+        problem: the problem.
+        d: (n,) design.
+        most: largest number of constants from the grid.
+    """
+    low, high, first = ends(problem.settings)
+    k, count = len(first), len(problem.points)
+    stages = np.unique(np.linspace(0, count - 1, min(count, _SAMPLED)).astype(int))
+    parts = np.linspace(0.0, 1.0, max(int(_COMBINED ** (1 / k)), 2))
+    grid = low + (high - low) * np.stack(np.meshgrid(*[parts] * k, indexing="ij"), axis=-1).reshape(-1, k)
+    found = problem.at(d, np.repeat(grid, len(stages), axis=0), np.tile(stages, len(grid)).tolist())
+    values = problem.combined(found.objective).reshape(len(grid), -1)
+    allowed = (found.excess <= 0).all(axis=1).reshape(values.shape) & np.isfinite(values)
+    values = np.where(allowed, values, _OUT)
+    weights = _stage_weights(problem.points.weights, stages, count)
+    level = values.min(axis=1) if problem.is_worst else values @ weights
+    kept: list[FloatArray] = []
+    for s in grid[np.argsort(-level, kind="stable")[: int(np.isfinite(level).sum())]]:
+        # Neighbours of a better constant would lead to the same optimum.
+        if len(kept) < most and all((np.abs(s - each) > _APART * (high - low)).any() for each in kept):
+            kept.append(s)
+    return [first, *kept]

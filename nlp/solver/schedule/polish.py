@@ -1,7 +1,8 @@
 """Ipopt near a schedule: settings at all points, or one constant, together with the free dimensions of the design.
 
 With its usual barrier Ipopt leaves the ridge on which it begins. The small barrier and distances from bounds keep it
-there. A largest worst value leaves most of the schedule open, so the mean is maximised next, at this level.
+there. A largest worst value leaves most of the schedule open, so the mean is maximised next, at this level. The mean of
+quantities of legs or actuators has one level for each point, which is below all of them.
 """
 
 from __future__ import annotations
@@ -79,7 +80,8 @@ def _search(
     n = len(d)
     rows = 1 if constant else count
     centre, half = _scales(problem)
-    x = MX.sym("x", n + rows * k + (goal == "level"))
+    levels = 1 if goal == "level" else count if problem.has_levels else 0
+    x = MX.sym("x", n + rows * k + levels)
     design = ca.DM(centre[:n]) + ca.DM(half[:n]) * x[:n] if n else MX(0, 1)
     own = ca.reshape(x[n : n + rows * k], k, rows)
     own = ca.repmat(ca.DM(centre[n:]), 1, rows) + ca.repmat(ca.DM(half[n:]), 1, rows) * own
@@ -87,9 +89,8 @@ def _search(
     values, limits = problem.function.map(count)(ca.repmat(design, 1, count), S, problem.numbers)
     T = values.shape[0]
     weighted = values * ca.repmat(ca.DM(problem.weights), 1, count)
-    mean = ca.dot(ca.sum1(weighted).T, ca.DM(problem.points.weights))
-    start = problem.at(d, s).objective
-    size = float(np.abs(problem.combined(start)).mean()) or 1.0
+    start = problem.combined(problem.at(d, s).objective)
+    size = float(np.abs(start).mean()) or 1.0
     g, low, high = [ca.vec(limits)], [-math.inf] * limits.numel(), [0.0] * limits.numel()
     if problem.of_design.numel():
         g.append(ca.Function("own", [problem.symbols[0]], [problem.of_design])(design))
@@ -100,14 +101,19 @@ def _search(
         low, high = low + [-end for end in ends_of_rates], high + ends_of_rates
     x0 = np.concatenate([(d - centre[:n]) / half[:n], ((s[:rows] - centre[n:]) / half[n:]).ravel()])
     lbx, ubx = -np.ones(len(x0)), np.ones(len(x0))
-    if goal == "level":
-        worst = problem.combined(start).min()
-        x0, lbx, ubx = np.append(x0, worst / size), np.append(lbx, -math.inf), np.append(ubx, math.inf)
-        g.append(ca.vec(weighted) / size - x[-1])
+    weights = ca.DM(problem.points.weights)
+    if levels:
+        first = start if levels > 1 else start.min(keepdims=True)
+        least = -math.inf if at_least is None else at_least / size
+        x0, lbx = np.append(x0, np.maximum(first / size, least)), np.append(lbx, np.full(levels, least))
+        ubx = np.append(ubx, np.full(levels, math.inf))
+        t = x[n + rows * k :]
+        above = ca.repmat(t.T, T, 1) if levels > 1 else ca.repmat(t, T, count)
+        g.append(ca.vec(weighted / size - above))
         low, high = low + [0.0] * (T * count), high + [math.inf] * (T * count)
-        objective = -x[-1]
+        objective = -ca.dot(t, weights) if levels > 1 else -t
     else:
-        objective = -mean / size
+        objective = -ca.dot(ca.sum1(weighted).T, weights) / size
         if at_least is not None:
             g.append(ca.vec(weighted) / size)
             low, high = low + [at_least / size] * (T * count), high + [math.inf] * (T * count)
@@ -119,6 +125,8 @@ def _search(
     low_d, high_d, _ = ends(problem.design)
     low_s, high_s, _ = ends(problem.settings)
     d_new, s_new = np.clip(new[0], low_d, high_d), np.clip(new[1], low_s, high_s)
+    if problem.is_periodic:
+        s_new[-1] = s_new[0]
     s_new = np.repeat(s_new, count, axis=0) if constant else within_rates(problem, s_new)
     if not problem.is_feasible(d_new, s_new):
         return None

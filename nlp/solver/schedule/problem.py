@@ -3,7 +3,8 @@
     maximise  sum_i w_i sum_j F_j(d, s_i, point_i)   or   min_ij F_j(d, s_i, point_i)
 
 over the design d and the settings s_i at N points, within limits at each point and ``|s_(i+1) - s_i| <= rate dt_i``. F
-is negative for a minimum. The function is mapped over the points, so its expressions do not grow with the path.
+is negative for a minimum. A quantity of the legs or actuators has the largest one as value of a point: ``min_j`` takes
+the place of the sum. The function is mapped over the points, so its expressions do not grow with the path.
 """
 
 from __future__ import annotations
@@ -18,13 +19,15 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import Dimension, FloatArray, RobotInstance, Substitution, instantiate
+from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, instantiate
 from ....models.joints.model.closedform import closed_form
 from ....models.rotation import matrix_from_axis_angle
+from ....models.statics import posed_statics
 from ....models.values import dataclass
 from ...case.case import Case
 from ...case.choices import check_no_catalogue
-from ...case.limits.constraint import BoundedConstraint
+from ...case.forces import forces_at
+from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses
@@ -32,12 +35,15 @@ from ...case.task import LEG_LENGTH, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
 from ...path.waypoints import Waypoints, waypoints
+from ...program.actuators import signed_values
 from ...program.layout import reference_of
 
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
+#: Rounding of a difference of two settings, relative to the largest setting.
+_ROUNDING = 2.0**-50
 
 
 class Variable(NamedTuple):
@@ -62,7 +68,7 @@ class Values(NamedTuple):
     """Values at points of the path.
 
     Attributes:
-        objective: (N, T) signed F of each task, or negative leg lengths.
+        objective: (N, T) signed F of each task, or negative quantities of legs or actuators.
         excess: (N, c) amounts by which limits are exceeded, relative to their sizes; negative within a limit.
     """
 
@@ -110,6 +116,11 @@ class ScheduleProblem:
         return self.case.over_path is OverPoses.WORST
 
     @property
+    def has_levels(self) -> bool:
+        """True if the value of a point is the worst of its objectives: quantities of legs or actuators."""
+        return bool(self.case.tasks[0].measure)
+
+    @property
     def is_periodic(self) -> bool:
         """True if settings are equal at the first and the last point."""
         return self.case.path is not None and self.case.path.periodic
@@ -146,9 +157,10 @@ class ScheduleProblem:
         return Values(objective.full().T, limits.full().T)
 
     def combined(self, objective: FloatArray) -> FloatArray:
-        """Return the value of each point from the objectives (..., T) of its tasks: their sum, or the worst."""
+        """Return the value of each point from its objectives (..., T): their sum, or the worst."""
         weighted = objective * self.weights
-        return np.asarray(weighted.min(axis=-1) if self.is_worst else weighted.sum(axis=-1))
+        is_worst = self.is_worst or self.has_levels
+        return np.asarray(weighted.min(axis=-1) if is_worst else weighted.sum(axis=-1))
 
     def value(self, d: FloatArray, s: FloatArray) -> float:
         """Return the signed objective of a design (n,) and a schedule (N, k)."""
@@ -159,15 +171,19 @@ class ScheduleProblem:
         """Return whether a schedule keeps all limits, its ranges and its rates, up to a relative slack."""
         values = self.at(d, s)
         low, high, _ = ends(self.settings)
+        # Differences of settings carry the rounding of the settings.
+        rounding = _ROUNDING * np.maximum(np.abs(low), np.abs(high))
         steps = np.abs(np.diff(s, axis=0)) - self.steps * (1 + slack)
+        closing = np.abs(s[-1] - s[0]) if self.is_periodic else np.zeros(s.shape[1])
         own = ca.Function("own", [self.symbols[0]], [self.of_design])(d).full()
         return bool(
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
             and (own <= slack).all()
-            and (s >= low - slack).all()
-            and (s <= high + slack).all()
-            and (steps <= slack * (high - low)).all()
+            and (s >= low - rounding).all()
+            and (s <= high + rounding).all()
+            and (steps <= rounding).all()
+            and (closing <= slack * (high - low)).all()
         )
 
 
@@ -199,6 +215,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
             f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
         )
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
+    _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
     point = SX.sym("point", _POINT)
     position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
@@ -214,20 +231,17 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     length = SX(case.characteristic_length)
     robot = instantiate(model, substitution, length, twists)
     stated = [
-        (item.constraint.name, item.constraint.expression, item.lower, item.upper)
+        (item.constraint.name, item.constraint.expression, item.lower, item.upper, item.constraint.reading)
         for item in _limits(case, robot, parameters)
     ]
     for reach in closed.reaches:
         value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
-        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf))
-    rows = [row for each in stated for row in _rows(*each)]
+        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf, NUMBER))
+    rows = [row for each in stated for row in _rows(*each, case.characteristic_length)]
     varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
-    lengths = case.tasks[0].measure == LEG_LENGTH
-    values = ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs]) if lengths else robot.F
-    if lengths and not robot.legs:
-        raise CaseError("objective.minimise", f"needs legs, but {case.model.name!r} has none", LEG_LENGTH)
-    weights = [1.0] * values.numel() if lengths else [task.weight for task in case.tasks]
+    values = _values(case, model, robot)
+    weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
     return ScheduleProblem(
         case=case,
         points=points,
@@ -249,6 +263,16 @@ def _check_times(case: Case, points: Waypoints) -> None:
     if limited and len(untimed):
         fault = f"needs the time of every segment, which the path does not state; give {limited[0]} the rate inf,"
         raise CaseError(f"{limited[0]}.rate", f"{fault} or state t or feed in the path", source=case.source)
+
+
+def _check_feeds(case: Case, points: Waypoints) -> None:
+    """Refuse a motion along the feed at a point where the platform does not translate."""
+    still = np.flatnonzero(~points.feeds.any(axis=1))
+    for index, task in enumerate(case.tasks):
+        if task.follows == "feed" and len(still):
+            x, y, z = points.positions[still[0]].tolist()
+            fault = f"has no direction at ({x:.7g}, {y:.7g}, {z:.7g}), where the platform rests or only rotates"
+            raise CaseError(f"task[{index}].follows", f"{fault}; use 'tool' or 'thrust', or divide the path", "feed")
 
 
 def _variables(case: Case) -> tuple[tuple[Variable, ...], tuple[Variable, ...], SX, SX, SX]:
@@ -288,6 +312,19 @@ def _twist(task: Task, position: SX, feed: SX, axis: SX) -> SX:
     return SX([float(part) for part in np.asarray(task.twist)])
 
 
+def _values(case: Case, model: Model, robot: RobotInstance) -> SX:
+    """Return F (T, 1) of the tasks at a point, or the quantities of legs or actuators that are minimised."""
+    measure = case.tasks[0].measure
+    if not measure:
+        return robot.F
+    if measure == LEG_LENGTH:
+        if not robot.legs:
+            raise CaseError("objective.minimise", f"needs legs, but {case.model.name!r} has none", LEG_LENGTH)
+        return ca.vertcat(*[ca.norm_2(leg.span) for leg in robot.legs])
+    forces = forces_at(model, posed_statics(model, robot), robot.rotation, case.loading, robot.size)
+    return ca.vertcat(*[each.value for each in signed_values(case, forces)])
+
+
 def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedConstraint]:
     """Return the limits of a case at one point."""
     stated = [*case.position, case.rotation.angle]
@@ -308,9 +345,11 @@ def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedCon
     return found
 
 
-def _rows(name: str, expression: SX, lower: float, upper: float) -> Iterator[tuple[str, SX]]:
+def _rows(
+    name: str, expression: SX, lower: float, upper: float, reading: Reading, length: float
+) -> Iterator[tuple[str, SX]]:
     """Yield one-sided rows ``row <= 0`` of a constraint, relative to the size of the bound."""
     if math.isfinite(upper):
-        yield name, (expression - upper) / (abs(upper) or 1.0)
+        yield name, (expression - upper) / reading.size(upper, length)
     if math.isfinite(lower):
-        yield name, (lower - expression) / (abs(lower) or 1.0)
+        yield name, (lower - expression) / reading.size(lower, length)

@@ -19,7 +19,7 @@ from ...case.case import Case
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses, Rotation
 from ...case.settings import Search
-from ...case.task import LEG_LENGTH, Sense, Task
+from ...case.task import Sense, Task
 from ...interruption import is_requested
 from ...path.path import Poses
 from ...program.formulation import formulate
@@ -150,7 +150,8 @@ def _solution(
     d, s = (ends(problem.design)[2], ends(problem.settings)[2]) if best is None else (best.d, best.s[0])
     start = at_first_point(problem, d, s)
     own = solve_program(formulate(start), replace(search, starts=1), jobs=1)
-    status = Status.INFEASIBLE if best is None else Status.LOCAL
+    # That no schedule was found does not prove that none exists.
+    status = Status.NOT_CONVERGED if best is None else Status.LOCAL
     if proved is not None and not proved.judgement.is_proved:
         status = Status.INTERRUPTED if is_requested() else Status.NOT_PROVED
     seconds = time.perf_counter() - began
@@ -220,7 +221,7 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         "thrust": (0.0, 0.0, 0.0, *axis),
         "tool": (*axis, *np.cross(p, axis)),
     }
-    if task.measure == LEG_LENGTH:
+    if task.measure:
         task = Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False)
     elif task.follows:
         task = replace(task, twist=twists[task.follows], follows="")
