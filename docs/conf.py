@@ -46,6 +46,8 @@ autodoc_preserve_defaults = True
 napoleon_attr_annotations = False
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True
+# Both packages have a class Actuator, and a signature names it without its package.
+suppress_warnings = ["ref.python"]
 maximum_signature_line_length = 100
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 from collections.abc import Mapping
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,10 @@ from ...models import Dimension, FloatArray
 from ...models.values import dataclass
 from ..case.pose import OverPoses
 from ..path.path import Poses
-from ..proof.workspace.judgement import Judgement
 from ..units import Units
+
+if TYPE_CHECKING:
+    from ..proof.workspace.judgement import Judgement  # few cases have a proof to load
 
 #: Relative gain over the best constant below which a schedule has no gain.
 NO_GAIN = 1e-6
