@@ -140,7 +140,7 @@ def test_two_settings_are_better_than_each_alone(tmp_path: Path) -> None:
     assert (np.abs(np.diff(both.values, axis=0)) <= seconds[:, None] * [0.5, 5] * (1 + 1e-12)).all()
     # Both settings move.
     assert (np.ptp(both.values, axis=0) > [1.0, 5.0]).all()
-    radius, turn = both.constant.values
+    radius, turn = both.constant.values.tolist()
     yaw = solve(load_case(str(_written(tmp_path, ("x1 = 26.5", f"x1 = {radius!r}"), count=50)))).schedule
     fixed = [("x1 = 26.5", _RADIUS), ("{ min = -75, max = 75, rate = 5 }", f"{turn!r}")]
     rails = solve(load_case(str(_written(tmp_path, *fixed, count=50)))).schedule
