@@ -1,7 +1,8 @@
 """Points of a path at which F and limits are taken while settings change: poses, feed directions, times and weights.
 
 The points are the knots of the path, and points between in its longer segments. The feed direction at a point is the
-mean of the directions of the adjacent segments, which is the tangent where a table approximates a smooth curve.
+mean of the directions of the adjacent segments, which is the tangent where a table approximates a smooth curve. Where
+the path turns back, it is the direction of the segment before.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from ...models import FloatArray
 from ..errors import InputError
 from .path import ProgrammedPath
 from .sampling import Points, twists_at
-from .standing import rest_length, turns_between
+from .standing import STILL, rest_length, turns_between
 
 #: Smallest number of segments of a path with long segments.
 LEAST = 200
@@ -125,7 +126,10 @@ def _feeds(path: ProgrammedPath, points: Points) -> FloatArray:
     if closed:
         # The point where a closed contour begins lies between its last and its first segment.
         last[0], first[-1] = found[1][-1], found[0][0]
-    return _units(_units(first) + _units(last))
+    # Where the path turns back, the mean has no direction: the feed is that of the arriving segment.
+    mean = first + last
+    is_back = np.linalg.norm(mean, axis=1, keepdims=True) <= STILL * np.linalg.norm(first, axis=1, keepdims=True)
+    return _units(np.where(is_back, last, mean))
 
 
 def _timed(path: ProgrammedPath) -> ProgrammedPath:

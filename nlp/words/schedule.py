@@ -81,7 +81,7 @@ def schedule_table(schedule: ScheduleData) -> TextTable:
 def no_schedule_line(case: Case) -> Line:
     """Return the outcome of a search without an answer."""
     names = ", ".join(case.settings) or "design"
-    words = f"infeasible: no schedule of {names} within the limits and rates was found"
+    words = f"no schedule found: the search found no {names} within the limits and rates; this is no proof"
     return Line(words, tone=Tone.NO_ANSWER)
 
 

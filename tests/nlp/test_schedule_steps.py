@@ -32,6 +32,13 @@ def tables(problem: ScheduleProblem) -> StepTables:
     return step_tables(problem)
 
 
+#: Points and degrees by which a controller is disturbed there.
+DISTURBED = [
+    (40, 3.0),
+    *(pytest.param(*each, marks=pytest.mark.soak) for each in ((40, -1.0), (100, 5.0), (150, -2.0))),
+]
+
+
 class Steps:
     """The C of the steps, compiled and loaded."""
 
@@ -108,7 +115,7 @@ def test_a_look_ahead_keeps_the_limits_where_greedy_steps_fail(problem: Schedule
 
 
 @needs_compiler
-@pytest.mark.parametrize(("point", "degrees"), [(40, 3.0), (40, -1.0), (100, 5.0), (150, -2.0)])
+@pytest.mark.parametrize(("point", "degrees"), DISTURBED)
 def test_a_disturbed_controller_still_ends_within_the_limits(
     problem: ScheduleProblem, tables: StepTables, steps: Steps, point: int, degrees: float
 ) -> None:

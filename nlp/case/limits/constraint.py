@@ -98,6 +98,17 @@ class Reading:
         """Power of the limit's unit in the program's bound; 0 for a plain number, such as a cosine."""
         return {_unchanged: 1, _square: 2}.get(self.to_value, 0)
 
+    def size(self, bound: float, length: float) -> float:
+        """Return the size to which a distance from the program's bound is relative.
+
+        Args:
+            bound: bound of the program.
+            length: characteristic length of the robot, for a length with the bound 0.
+        """
+        if bound:
+            return abs(bound)
+        return length**self.power if self.dimension is Dimension.LENGTH else 1.0
+
 
 def squared(dimension: Dimension) -> Reading:
     """Return the reading of a square as its positive root."""

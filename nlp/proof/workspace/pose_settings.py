@@ -242,7 +242,9 @@ class _Samples:
         claims = [*reach_claims_on(layout, closed.reaches), *claims_of(layout, with_objective=False)]
         limited = [each for each in claims if each.limit is not None]
         beyond = [
-            -each.sense.sign * ((each.limit or 0.0) - each.expression) / (abs(each.limit or 0.0) or 1.0)
+            -each.sense.sign
+            * ((each.limit or 0.0) - each.expression)
+            / each.reading.size(each.limit or 0.0, case.characteristic_length)
             for each in limited
         ]
         worst = ca.mmax(ca.vertcat(ca.SX(-1.0), *beyond))

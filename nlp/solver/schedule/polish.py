@@ -125,6 +125,8 @@ def _search(
     low_d, high_d, _ = ends(problem.design)
     low_s, high_s, _ = ends(problem.settings)
     d_new, s_new = np.clip(new[0], low_d, high_d), np.clip(new[1], low_s, high_s)
+    if problem.is_periodic:
+        s_new[-1] = s_new[0]
     s_new = np.repeat(s_new, count, axis=0) if constant else within_rates(problem, s_new)
     if not problem.is_feasible(d_new, s_new):
         return None

@@ -27,7 +27,7 @@ from ....models.values import dataclass
 from ...case.case import Case
 from ...case.choices import check_no_catalogue
 from ...case.forces import forces_at
-from ...case.limits.constraint import BoundedConstraint
+from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses
@@ -42,6 +42,8 @@ from ...program.layout import reference_of
 _POINT = 16
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
+#: Rounding of a difference of two settings, relative to the largest setting.
+_ROUNDING = 2.0**-50
 
 
 class Variable(NamedTuple):
@@ -169,15 +171,19 @@ class ScheduleProblem:
         """Return whether a schedule keeps all limits, its ranges and its rates, up to a relative slack."""
         values = self.at(d, s)
         low, high, _ = ends(self.settings)
+        # Differences of settings carry the rounding of the settings.
+        rounding = _ROUNDING * np.maximum(np.abs(low), np.abs(high))
         steps = np.abs(np.diff(s, axis=0)) - self.steps * (1 + slack)
+        closing = np.abs(s[-1] - s[0]) if self.is_periodic else np.zeros(s.shape[1])
         own = ca.Function("own", [self.symbols[0]], [self.of_design])(d).full()
         return bool(
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
             and (own <= slack).all()
-            and (s >= low - slack).all()
-            and (s <= high + slack).all()
-            and (steps <= slack * (high - low)).all()
+            and (s >= low - rounding).all()
+            and (s <= high + rounding).all()
+            and (steps <= rounding).all()
+            and (closing <= slack * (high - low)).all()
         )
 
 
@@ -209,6 +215,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
             f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
         )
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
+    _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
     point = SX.sym("point", _POINT)
     position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
@@ -224,13 +231,13 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     length = SX(case.characteristic_length)
     robot = instantiate(model, substitution, length, twists)
     stated = [
-        (item.constraint.name, item.constraint.expression, item.lower, item.upper)
+        (item.constraint.name, item.constraint.expression, item.lower, item.upper, item.constraint.reading)
         for item in _limits(case, robot, parameters)
     ]
     for reach in closed.reaches:
         value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
-        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf))
-    rows = [row for each in stated for row in _rows(*each)]
+        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf, NUMBER))
+    rows = [row for each in stated for row in _rows(*each, case.characteristic_length)]
     varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
     values = _values(case, model, robot)
@@ -256,6 +263,16 @@ def _check_times(case: Case, points: Waypoints) -> None:
     if limited and len(untimed):
         fault = f"needs the time of every segment, which the path does not state; give {limited[0]} the rate inf,"
         raise CaseError(f"{limited[0]}.rate", f"{fault} or state t or feed in the path", source=case.source)
+
+
+def _check_feeds(case: Case, points: Waypoints) -> None:
+    """Refuse a motion along the feed at a point where the platform does not translate."""
+    still = np.flatnonzero(~points.feeds.any(axis=1))
+    for index, task in enumerate(case.tasks):
+        if task.follows == "feed" and len(still):
+            x, y, z = points.positions[still[0]].tolist()
+            fault = f"has no direction at ({x:.7g}, {y:.7g}, {z:.7g}), where the platform rests or only rotates"
+            raise CaseError(f"task[{index}].follows", f"{fault}; use 'tool' or 'thrust', or divide the path", "feed")
 
 
 def _variables(case: Case) -> tuple[tuple[Variable, ...], tuple[Variable, ...], SX, SX, SX]:
@@ -328,9 +345,11 @@ def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedCon
     return found
 
 
-def _rows(name: str, expression: SX, lower: float, upper: float) -> Iterator[tuple[str, SX]]:
+def _rows(
+    name: str, expression: SX, lower: float, upper: float, reading: Reading, length: float
+) -> Iterator[tuple[str, SX]]:
     """Yield one-sided rows ``row <= 0`` of a constraint, relative to the size of the bound."""
     if math.isfinite(upper):
-        yield name, (expression - upper) / (abs(upper) or 1.0)
+        yield name, (expression - upper) / reading.size(upper, length)
     if math.isfinite(lower):
-        yield name, (lower - expression) / (abs(lower) or 1.0)
+        yield name, (lower - expression) / reading.size(lower, length)

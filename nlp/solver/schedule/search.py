@@ -150,7 +150,8 @@ def _solution(
     d, s = (ends(problem.design)[2], ends(problem.settings)[2]) if best is None else (best.d, best.s[0])
     start = at_first_point(problem, d, s)
     own = solve_program(formulate(start), replace(search, starts=1), jobs=1)
-    status = Status.INFEASIBLE if best is None else Status.LOCAL
+    # That no schedule was found does not prove that none exists.
+    status = Status.NOT_CONVERGED if best is None else Status.LOCAL
     if proved is not None and not proved.judgement.is_proved:
         status = Status.INTERRUPTED if is_requested() else Status.NOT_PROVED
     seconds = time.perf_counter() - began
