@@ -33,6 +33,7 @@ from .case.pathfile import PathFile as PathFile
 from .case.pathfile import Tool as Tool
 from .case.pose import Free as Free
 from .case.pose import OverPoses as OverPoses
+from .case.pose import PerPose as PerPose
 from .case.pose import PerTask as PerTask
 from .case.pose import Pose as Pose
 from .case.pose import Rotation as Rotation
@@ -53,6 +54,7 @@ from .case.source import shipped_cases as shipped_cases
 from .case.task import Method as Method
 from .case.task import Sense as Sense
 from .case.task import Task as Task
+from .case.workspace import PoseSettings as PoseSettings
 from .case.workspace import TurnKind as TurnKind
 from .case.workspace import Turns as Turns
 from .case.workspace import Workspace as Workspace
@@ -95,12 +97,12 @@ from .front.front import Front as Front
 from .front.front import FrontPoint as FrontPoint
 from .front.front import pareto as pareto
 from .front.goals import Goal as Goal
+from .output.live.embed import report as report
 from .output.notebook import Picture as Picture
 from .output.notebook import html_of as html_of
 from .output.notebook import picture_of as picture_of
 from .output.notebook import text_of as text_of
 from .output.pictures.plot import plot as plot
-from .output.report.webpage import report as report
 from .output.sweeptable import sweep as sweep
 from .path.options import PathOptions as PathOptions
 from .path.path import ProgrammedPath as ProgrammedPath

@@ -2,6 +2,7 @@
 
 from ..output.checks import checks_as_junit as checks_as_junit
 from ..output.checks import checks_as_markdown as checks_as_markdown
+from ..output.live.track import live_path_page as live_path_page
 from ..output.pictures.designs import designs_figure as designs_figure
 from ..output.pictures.drawing import drawing_of_model as drawing_of_model
 from ..output.pictures.figures import figure_of as figure_of
@@ -13,7 +14,6 @@ from ..output.pictures.solutions import drawings_of as drawings_of
 from ..output.pictures.workspaces import drawing_at as drawing_at
 from ..output.pictures.workspaces import slices_figure as slices_figure
 from ..output.report.designs import designs_page as designs_page
-from ..output.report.path import path_page as path_page
 from ..output.report.workspace import WorkspaceReport as WorkspaceReport
 from ..output.report.workspace import workspace_page as workspace_page
 from ..output.tables import designs_markdown as designs_markdown

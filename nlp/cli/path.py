@@ -147,7 +147,7 @@ def path(
         json=lambda: result,
         csv=lambda: None if judged.knots is None else contents.knots_csv(judged.case, judged.path, judged.knots),
         plot=lambda: contents.path_figure(picture()),
-        html=lambda: contents.path_page(picture(), text, command),
+        html=lambda: contents.live_path_page(picture(), text, command, case),
         proof=lambda: path_proof_text(proof, loaded, judged, record, text, premises),
     )
 

@@ -38,6 +38,7 @@ def report(
     check_outputs(inputs, {"--out": out})
     check_library("plotly", "reports")
     check_library("matplotlib", "reports")
+    from ..output.live.embed import live_view_of
     from ..output.report.report import report_of
     from ..output.report.webpage import page_of
     from ..results.checks import check_case
@@ -64,7 +65,7 @@ def report(
             solution, result, lambda name, value: load_case(case, {**fixed, **chosen, name: value}), jobs
         )
         page = replace(page, curves=curves)
-    write_text(out, page_of(page))
+    write_text(out, page_of(page, live_view_of(solution, case)))
     if out != "-":
         print_line(f"{one_line(out)}: {solution.status.value}{f'; {refusal}' if refusal else ''}")
     raise SystemExit(0 if solution.status.is_answer and is_proved else 1)

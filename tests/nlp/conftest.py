@@ -176,7 +176,7 @@ class Embedded:
         """Compare every function with the program's own, at random points."""
         p, kernels, n = np.ascontiguousarray(nlp.arguments), nlp.program.kernels, nlp.n
         m, limits = len(nlp.program.model.frame_rows), len(nlp.program.constraints)
-        tasks, legs, poses = self.macro("TASKS"), self.macro("LEGS"), self.macro("POSES")
+        tasks, legs, poses = self.macro("POSETASKS"), self.macro("LEGS"), self.macro("POSES")
         k, work = np.zeros(self.macro("K") + 1), np.zeros(self.macro("WORK"))
         F, gradient, hessian = np.zeros(1), np.zeros(n), np.zeros((n, n))
         J, rates, g, dg = np.zeros((m, 6)), np.zeros((m, tasks)), np.zeros(limits), np.zeros((limits, n))

@@ -133,7 +133,7 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
     [
         (('[[load]]\nname = "handling"\nforce = [2, 2, -10]\n', ""), "needs a table [[load]]"),
         (('"actuator_force"', '"actuator_speed"'), "needs the table [motion]"),
-        (('"actuator_force"', '"leg_length"'), "must be one of 'actuator_force'"),
+        (('"actuator_force"', '"mass"'), "must be one of 'actuator_force'"),
         (
             ("[objective]", TASK.replace("min", "max") + "[objective]"),
             "objective.minimise needs no task: remove [[task]]",

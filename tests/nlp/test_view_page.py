@@ -432,6 +432,10 @@ def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_
     ]
     assert len(ranges) == 2
     before = page.F
+    # Until a change, the copied file has the weights of the case.
+    assert [each.weight for each in load_case(copied_case(page, tmp_path)).tasks] == [
+        each.weight for each in load_case("peg-in-hole").tasks
+    ]
     page.chrome.execute_async_script(
         "const [range, done] = arguments; range.value = '1.5'; range.dispatchEvent(new Event('input'));"
         "requestAnimationFrame(() => requestAnimationFrame(done));",
@@ -453,6 +457,18 @@ def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_
         for weight, value, sign in zip(weights, values, signs, strict=True)
     )
     assert pytest.approx(total, rel=1e-9) == page.F
+    file = copied_case(page, tmp_path)
+    assert [each.weight for each in load_case(file).tasks] == pytest.approx(weights, rel=1e-15)
+    assert cli("evaluate", file, "--json", str(target))[0] in (0, 1)
+    again = [each["F"] for each in json.loads(target.read_text())["tasks"]]
+    assert again == pytest.approx(values, rel=1e-9)
+
+
+def copied_case(page: Live, folder: Path) -> str:
+    """Write the case file that the page copies, and return its path."""
+    file = folder / "copied.toml"
+    file.write_text(page.copied("copy-case"), encoding="utf-8")
+    return str(file)
 
 
 @needs_compiler

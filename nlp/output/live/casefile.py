@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Collection, Iterator
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 
@@ -20,24 +20,26 @@ _NUMBER = r"[-+]?[0-9.]+(?:e[-+]?\d+)?"
 
 
 class SetPart(TypedDict):
-    """Place of a value by its name, as for ``--set``."""
+    """Place of a value by its name, as for ``--set``; with the case's own text where a page keeps it until a change."""
 
     set: str
+    stated: NotRequired[str]
 
 
-def case_parts(case: Case, limits: Collection[str]) -> list[str | SetPart]:
+def case_parts(case: Case, limits: Collection[str], *, has_weights: bool = False) -> list[str | SetPart]:
     """Return the parts of a case file of a case with fixed variables; empty if no case file can state it.
 
     Args:
         case: the case.
         limits: keys of the limits that the page can change.
+        has_weights: True if the page can change the weights of the tasks.
     """
     try:
         text = case.to_toml()
     except CaseError:
         return []
     found: list[str | SetPart] = []
-    for part in _parts(case, text, limits):
+    for part in _parts(case, text, limits, has_weights=has_weights):
         if isinstance(part, str) and found and isinstance(found[-1], str):
             found[-1] += part
         else:
@@ -55,7 +57,7 @@ def stated_tasks(case: Case) -> list[dict[str, Any]]:
     return [each if {"axis", "pitch"} <= each.keys() else {} for each in found]
 
 
-def _parts(case: Case, text: str, limits: Collection[str]) -> Iterator[str | SetPart]:
+def _parts(case: Case, text: str, limits: Collection[str], *, has_weights: bool) -> Iterator[str | SetPart]:
     """Yield the parts of a text of :meth:`.Case.to_toml`."""
     names = {item.name: case.component_names(item) for item in case.model.parameters}
     tasks = stated_tasks(case)
@@ -77,14 +79,36 @@ def _parts(case: Case, text: str, limits: Collection[str]) -> Iterator[str | Set
             yield from _rotation(case, pose)
         elif equals and section == "pose" and key == "rotation":
             continue
-        elif equals and section == "task" and key in tasks[task]:
-            yield f"{key} = "
-            yield {"set": f"task[{task}].{key}"}
-            yield "\n"
+        elif equals and section == "task":
+            weight = float(case.tasks[task].weight) if has_weights else None
+            yield from _task(line, key, f"task[{task}]", tasks[task], weight)
         elif equals and section.startswith("limits"):
             yield from _limit(line, ".".join([section, key]), limits)
         else:
             yield line
+
+
+def _task(line: str, key: str, name: str, stated: Collection[str], weight: float | None) -> Iterator[str | SetPart]:
+    """Yield a line of a task with a place for its value; a weight that a page can change follows the sense.
+
+    Args:
+        line: the line.
+        key: key of the line.
+        name: name of the task for ``--set``.
+        stated: keys that the page can change.
+        weight: weight of the case; None for one that the page cannot change.
+    """
+    if key in stated:
+        yield f"{key} = "
+        yield {"set": f"{name}.{key}"}
+        yield "\n"
+    elif weight is None or key != "weight":
+        yield line
+    # Every task has a sense, but only some have a stated weight.
+    if weight is not None and key == "sense":
+        yield "weight = "
+        yield {"set": f"{name}.weight", "stated": repr(weight)}
+        yield "\n"
 
 
 def _assigned(line: str, names: tuple[str, ...]) -> Iterator[str | SetPart]:

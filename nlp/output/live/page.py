@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import math
 import re
 import shlex
 from collections.abc import Iterable, Sequence
@@ -20,6 +21,7 @@ from ...errors import EvaluationError, InputError
 from ...evidence.evaluation import starting_point
 from ...evidence.state import evaluate
 from ...program.nlp import Nlp
+from ...program.places import FreeRotation
 from ...results.data import SolveResult
 from ...results.objective import unit_of_objective
 from ...results.result import result_of
@@ -31,8 +33,9 @@ from ...words.lines import headline, task_lines, title_line
 from ...words.numbers import number
 from ...words.text import Line
 from ..pictures.drawing import Drawing, drawing_of
+from ..pictures.posture import Posture
 from ..pictures.view import clearest_view
-from ..report.frames import joint_data, link_data
+from ..report.frames import joint_data, link_data, postures_along_motion
 from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
 from .casefile import case_parts, stated_tasks
 
@@ -41,6 +44,7 @@ SCRIPTS = (
     "numbers.js",
     "names.js",
     "module.js",
+    "limits.js",
     "state.js",
     "text.js",
     "scene.js",
@@ -50,10 +54,16 @@ SCRIPTS = (
     "bars.js",
     "jumps.js",
     "map.js",
+    "play.js",
+    "track.js",
     "main.js",
 )
+#: Recorded positions on each side of the pose, and rounding of coordinates relative to the robot's size.
+_RECORDED, _FINE = 12, 1e-7
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=const|class)", re.MULTILINE)
+#: Pieces of the view in the template of its page.
+_PIECES = ("style", "heading", "task", "answer", "body", "footer", "data", "module", "script")
 #: Statuses of the module in words, by code.
 _STATUSES = (
     "optimum",
@@ -64,6 +74,19 @@ _STATUSES = (
     "an optimum in another assembly mode than home",
     "optimum at the end of a joint range or of the home assembly mode",
 )
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Postures along a path.
+
+    Attributes:
+        x: (n,) variables at the first shown posture.
+        data: data of the script: postures, path, violations, and curves at each posture.
+    """
+
+    x: FloatArray
+    data: dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,22 +104,69 @@ class LivePage:
     size: int
 
 
+@dataclass(frozen=True, eq=False)
+class LiveParts:
+    """Pieces of the live view of a case, for its own page and for the first screen of other pages.
+
+    Attributes:
+        style: style sheet; its rules hold in a document and in the shadow tree of an element.
+        heading: title of the case.
+        task: task in words.
+        answer: content of the headline.
+        body: picture and controls.
+        footer: origin of the values.
+        data: JSON of the script.
+        module: WebAssembly module, compressed and encoded; empty without one.
+        script: script, as one text without imports.
+        fault: reason why the view cannot solve; empty if it can.
+        size: bytes of the module; 0 without one.
+    """
+
+    style: Markup
+    heading: Markup
+    task: Markup
+    answer: Markup
+    body: Markup
+    footer: Markup
+    data: Markup
+    module: str
+    script: Markup
+    fault: str
+    size: int
+
+
 def live_page(source: ViewSource, solution: Solution | None, command: str) -> LivePage:
-    """Return the live page of a case.
+    """Return the live page of a case; the arguments are those of :func:`live_parts`."""
+    parts = live_parts(source, solution, command)
+    case = source.subject.nlp.case
+    texts = {name: getattr(parts, name) for name in _PIECES}
+    title = tag("title", f"{case.title or case.name} - screwsynth")
+    return LivePage(Template(_file("live.html.in")).substitute(texts, title=title), parts.fault, parts.size)
+
+
+def live_parts(source: ViewSource, solution: Solution | None, command: str, track: Track | None = None) -> LiveParts:
+    """Return the pieces of the live view of a case.
 
     Args:
         source: C of the live view.
         solution: solution of the case; None for a case that is only evaluated.
         command: name of the case on the command line.
+        track: postures along a path, with which the page moves; None for none.
+
+    Raises:
+        InputError: the robot has no configuration at the shown point.
     """
     nlp = source.subject.nlp
     case = nlp.case
     module, fault = _module(source)
     data = view_data(source)
     answer = None if solution is None else _answer(solution)
-    start = starting_point(nlp)
+    start = starting_point(nlp) if track is None else track.x
     x = start if answer is None else np.array(answer["x"])
     drawing = _drawing(nlp, x)
+    if track is not None:
+        # The range of rotations is only that of the path.
+        data["rows"] = [each for each in data["rows"] if each["name"] != "angle"]
     page = {
         **data,
         "scene": _scene(drawing),
@@ -109,24 +179,31 @@ def live_page(source: ViewSource, solution: Solution | None, command: str) -> Li
         "F_name": _name_of_F(case),
         "is_stated": case.tasks[0].is_stated,
         "command": shlex.quote(command),
-        "case_parts": case_parts(case, [each["key"] for each in data["limits"]]),
+        "case_parts": case_parts(
+            case,
+            [each["key"] for each in data["limits"]],
+            has_weights=all(each["weight"] >= 0 for each in data["tasks"]),
+        ),
         "has_module": bool(module),
         "stated_tasks": _for_json(stated_tasks(case)),
         "prefixes": list(case.pose_prefixes),
+        "track": None if track is None else track.data,
+        "recorded": _recorded(nlp, x, is_needed=track is None and (bool(fault) or not _has_free_turns(nlp))),
         "stated_poses": [k for k, pose in enumerate(case.poses) for _ in pose.displacements],
     }
-    parts = {
-        "title": tag("title", f"{case.title or case.name} - screwsynth"),
-        "style": Markup(_file("live.css")),
-        "heading": join_markup([tag("h1", title_line(case).words), *_task(case, solution)]),
-        "answer": _answer_markup(answer),
-        "body": _body(case, data, drawing, fault),
-        "footer": _footer(source, module),
-        "data": script_json(page),
-        "module": base64.b64encode(gzip.compress(module, mtime=0)).decode("ascii") if module else "",
-        "script": Markup(script_text()),
-    }
-    return LivePage(Template(_file("live.html.in")).substitute(parts), fault, len(module))
+    return LiveParts(
+        style=Markup(_file("live.css")),
+        heading=tag("h1", title_line(case).words),
+        task=_task(case, solution),
+        answer=_answer_markup(answer),
+        body=_body(case, data, drawing, fault),
+        footer=_footer(source, module),
+        data=script_json(page),
+        module=base64.b64encode(gzip.compress(module, mtime=0)).decode("ascii") if module else "",
+        script=Markup(script_text()),
+        fault=fault,
+        size=len(module),
+    )
 
 
 def _module(source: ViewSource) -> tuple[bytes, str]:
@@ -139,9 +216,9 @@ def _module(source: ViewSource) -> tuple[bytes, str]:
         return b"", str(error)
 
 
-def script_text() -> str:
-    """Return the modules of the page as one: imports and exports are left out, so all names are in one scope."""
-    return "".join(_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in SCRIPTS)
+def script_text(names: Sequence[str] = SCRIPTS) -> str:
+    """Return modules of the page as one: imports and exports are left out, so all names are in one scope."""
+    return "".join(_EXPORT.sub("", _IMPORT.sub("", _file(name))) for name in names)
 
 
 def _file(name: str) -> str:
@@ -184,13 +261,13 @@ def _answer_markup(answer: dict[str, Any] | None) -> Markup:
     )
 
 
-def _task(case: Case, solution: Solution | None) -> Iterable[Markup]:
-    """Yield the task in words."""
+def _task(case: Case, solution: Solution | None) -> Markup:
+    """Return the task in words."""
     result = None if solution is None else result_of(solution)
     lines: list[Line] = []
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
         lines = [*task_lines(result.robot.task, case.units)]
-    yield tag("div", paragraphs(lines), class_="task", id="stated-task")
+    return tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 
 def _drawing(nlp: Nlp, x: FloatArray) -> Drawing:
@@ -215,6 +292,32 @@ def _scene(drawing: Drawing) -> dict[str, Any]:
         "corners": list(drawing.corners),
         "size": drawing.size,
     }
+
+
+def _has_free_turns(nlp: Nlp) -> bool:
+    """Return whether the module can turn the robot at every pose about any axis."""
+    return all(isinstance(each, FreeRotation) for each in nlp.program.places.rotations)
+
+
+def _recorded(nlp: Nlp, x: FloatArray, *, is_needed: bool) -> list[dict[str, Any] | None]:
+    """Return the robot along the motion of each task, for a page that cannot compute it; None where it cannot move."""
+    found: list[dict[str, Any] | None] = []
+    for k, task in enumerate(nlp.case.tasks):
+        if not is_needed or not task.is_stated:
+            found.append(None)
+            continue
+        drawing = drawing_of(nlp, x, evaluate(nlp, x), k)
+        postures, zero = postures_along_motion(drawing, _RECORDED)
+        values = [_drawn_values(each.posture, drawing.size) for each in postures]
+        found.append({"zero": zero, "frames": values} if len(values) > 1 else None)
+    return found
+
+
+def _drawn_values(posture: Posture, size: float) -> list[float]:
+    """Return points, circles, joints and position of a posture, rounded relative to the robot's size."""
+    parts = [posture.points, posture.circles, *posture.joints, posture.position]
+    places = max(0, math.ceil(-math.log10(_FINE * size)))
+    return [round(value, places) for part in parts for value in np.ravel(part).tolist()]
 
 
 def _for_json(tasks: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -252,6 +355,7 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
             tag("span", class_="scale", aria_hidden="true"),
             tag("span", "blue negative, orange positive"),
             tag("label", "Shown: ", tag("select", *poses, id="pose")) if len(poses) > 1 else None,
+            *_players(case),
             tag("button", "Reset view", type="button", id="view-reset"),
             tag("button", "Fit", type="button", id="view-fit"),
             tag("span", _legend(stated=stated), class_="extra") if stated else None,
@@ -259,6 +363,14 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
         id="picture",
     )
     return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
+
+
+def _players(case: Case) -> Iterable[Markup]:
+    """Yield the buttons that play the motion of each task; the script shows them if the robot can follow it."""
+    for k, task in enumerate(case.tasks):
+        if task.is_stated:
+            words = "Play motion" if len(case.tasks) == 1 else f"Play {task.name}"
+            yield tag("button", words, type="button", class_="play", data_play=k, aria_pressed="false", hidden=True)
 
 
 def _legend(*, stated: bool) -> str:
@@ -326,7 +438,8 @@ def _values(data: ViewData) -> Markup:
         ),
     )
     limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    return tag("div", values, _actuators(data), limits, _map(), id="values", class_="needs-module")
+    track = tag("section", id="track", aria_label="Actuators at this point of the path")
+    return tag("div", track, values, _actuators(data), limits, _map(), id="values", class_="needs-module")
 
 
 def _map() -> Markup:

@@ -232,7 +232,7 @@ class _TimedPosture(NamedTuple):
     posture: Posture
 
 
-class _PostureSequence(NamedTuple):
+class PostureSequence(NamedTuple):
     """Postures in order of time, and the index of the posture at ``t = 0``."""
 
     postures: list[_TimedPosture]
@@ -273,7 +273,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
     units = drawing.case.units if drawing.case is not None else Units()
     F = settled(float(rates @ rates), shown.size, ZERO_F)
     unit_of_F = "" if motion is None else objective_unit([motion.twist], units)
-    postures, zero = _postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
+    postures, zero = postures_along_motion(drawing, min(_SIDE, max(_LEAST_SIDE, _SIDES // shown.views)))
     return {
         "name": "" if motion is None else motion.name,
         "task": shown.task,
@@ -348,13 +348,13 @@ def _forces_words(forces: DrawnForces | None) -> str:
     return "; ".join(words) + "."
 
 
-def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
+def postures_along_motion(drawing: Drawing, count: int) -> PostureSequence:
     """Return postures along the motion of a drawing, at most ``count`` before and after the drawing's posture.
 
     The postures end where the robot cannot be assembled; without a motion, there is only the drawing's posture.
     """
     if drawing.motion is None:
-        return _PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
+        return PostureSequence([_TimedPosture(0.0, drawing.posture)], 0)
     step = _largest_time(drawing) / count
     sides: list[list[_TimedPosture]] = []
     for sign in (-1, 1):
@@ -370,7 +370,7 @@ def _postures_along_motion(drawing: Drawing, count: int) -> _PostureSequence:
             side.append(_TimedPosture(sign * step * k, last))
         sides.append(side)
     back, forth = sides
-    return _PostureSequence([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
+    return PostureSequence([*reversed(back), _TimedPosture(0.0, drawing.posture), *forth], len(back))
 
 
 def _largest_time(drawing: Drawing) -> float:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...words.text import Line
 
@@ -24,6 +24,20 @@ class Markup(str):
     __slots__ = ()
 
 
+class LiveView(NamedTuple):
+    """Live view for the first screen of a page.
+
+    Attributes:
+        markup: elements of the view, with its data and script, or a sentence in their place; empty for none.
+        is_live: True if the view has a solver, so that it replaces other pictures of the robot.
+    """
+
+    markup: Markup
+    is_live: bool
+
+
+#: Page without a live view.
+NO_LIVE_VIEW = LiveView(Markup(""), is_live=False)
 #: Elements without an end tag.
 _VOID = frozenset(["meta", "link", "input", "br", "img", "source"])
 #: Elements whose text is copied into a shell or a file, character by character.
@@ -143,6 +157,7 @@ def whole_page(
     scripts: Sequence[str] = (),
     data: Any = None,  # noqa: ANN401 - whatever JSON can hold
     plotly: str = "",
+    live: Markup | str = "",
 ) -> str:
     """Return a page. Without further scripts, its script only marks tables that scroll.
 
@@ -157,6 +172,7 @@ def whole_page(
         scripts: names of further scripts.
         data: data for the scripts.
         plotly: packed Plotly library, or an empty text.
+        live: live view, between the main result and the contents.
     """
     parts = {
         "title": tag("title", f"{title} - screwsynth"),
@@ -169,6 +185,7 @@ def whole_page(
         "script": Markup("".join(map(_file, ("tables.js", *scripts)))),
         "data": script_json({} if data is None else data),
         "plotly": plotly,
+        "live": live,
     }
     return Template(_file("report.html.in")).substitute(parts)
 

@@ -23,6 +23,8 @@ from ..pictures.pathpanels import (
 )
 from .charts import Band, Curve, Strip, line_chart, strip_chart
 from .markup import (
+    NO_LIVE_VIEW,
+    LiveView,
     Markup,
     answer_box,
     contents_and_body,
@@ -44,13 +46,16 @@ _POINTS = 600
 _RED = "#a3250f"
 
 
-def path_page(picture: PathPicture, text: str, command: Callable[[PathVerdictData], str]) -> str:
+def path_page(
+    picture: PathPicture, text: str, command: Callable[[PathVerdictData], str], live: LiveView = NO_LIVE_VIEW
+) -> str:
     """Return the page, which opens without a network; verdicts and curves need no script.
 
     Args:
         picture: path with its verdicts and curves.
         text: text of the case file.
         command: function that returns the command that shows a violated claim.
+        live: live view along the path, which replaces the 3-D view.
     """
     case, result = picture.judged.case, picture.result
     title = case.title or case.name
@@ -59,7 +64,7 @@ def path_page(picture: PathPicture, text: str, command: Callable[[PathVerdictDat
         ("verdicts", "Verdicts along the path", _verdicts(picture)),
         ("refuted", "Violated limits and singularities", _refuted(picture, command)),
         # One section, in which the slider stays visible.
-        ("robot", "Robot along the path", join_markup([_robot(picture, view), _curves(picture)])),
+        ("robot", "Robot along the path", join_markup([_robot(picture, view, is_live=live.is_live), _curves(picture)])),
         ("origin", "Case file and versions", origin(result.versions, text)),
     ]
     contents, body = contents_and_body(sections)
@@ -76,9 +81,10 @@ def path_page(picture: PathPicture, text: str, command: Callable[[PathVerdictDat
         heading=title,
         contents=contents,
         styles=("workspace.css", "path.css"),
-        scripts=() if view is None else ("tools.js", "joints.js", "robot.js", "path.js"),
-        data={"result": json_data(result), "view": None if view is None else view.data},
-        plotly="" if view is None else packed_plotly(),
+        scripts=() if view is None or live.is_live else ("tools.js", "joints.js", "robot.js", "path.js"),
+        data={"result": json_data(result), "view": None if view is None or live.is_live else view.data},
+        plotly="" if view is None or live.is_live else packed_plotly(),
+        live=live.markup if view is None or not live.is_live else join_markup([_controls(view), live.markup]),
     )
 
 
@@ -91,13 +97,11 @@ def _verdicts(picture: PathPicture) -> Markup:
     return shown_verdicts(path_summary(picture.judged.case, picture.result), "path", words)
 
 
-def _robot(picture: PathPicture, view: PathView | None) -> Markup:
-    """Return the 3-D view with its slider and legend."""
-    if view is None:
-        return paragraphs(["No view: the joint coordinates are not known at any point of the path."])
+def _controls(view: PathView) -> Markup:
+    """Return the slider over the path, with its button."""
     data, last = view.data, len(view.data["frames"]) - 1
     words = data["frames"][data["first"]]["words"]
-    controls = tag(
+    return tag(
         "p",
         tag("button", "Play", type="button", id="play"),
         tag("label", "Position along the path", for_="travel"),
@@ -105,9 +109,24 @@ def _robot(picture: PathPicture, view: PathView | None) -> Markup:
         tag("output", words, id="travelled", for_="travel"),
         class_="controls travel along script",
     )
+
+
+def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Markup:
+    """Return the 3-D view with its slider and legend; with a live view, a drawing and the legend."""
+    if view is None:
+        return paragraphs(["No view: the joint coordinates are not known at any point of the path."])
+    data = view.data
+    words = data["frames"][data["first"]]["words"]
     options = [tag("option", "nearest limit", value="nearest"), tag("option", "margin", value="margin")]
-    colour = tag("label", "Colour of the path: ", for_="colour"), tag("select", *options, id="colour")
+    colour = (
+        tag("label", "Colour of the path: ", for_="path-colour" if is_live else "colour"),
+        tag("select", *options, id="path-colour" if is_live else "colour"),
+    )
+    coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
     still = image_source(picture_file([view.drawing], ".svg"))
+    if is_live:
+        image = tag("img", src=still, alt=f"Robot, {words}.", class_="design printed")
+        return join_markup([*coloured, tag("figure", image, tag("figcaption", _legend(picture, data["marks"] != [])))])
     flat = "No WebGL in this browser: the drawing of the robot is fixed, but the curves follow the slider."
     figure = tag(
         "figure",
@@ -118,9 +137,8 @@ def _robot(picture: PathPicture, view: PathView | None) -> Markup:
         tag("img", id="view-copy", class_="copy", alt="3-D view of the robot"),
         tag("figcaption", _legend(picture, data["marks"] != []), id="view-words"),
     )
-    coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
     note = "The view needs JavaScript; all curves and tables are complete without it."
-    return join_markup([controls, *coloured, figure, tag("noscript", tag("p", note))])
+    return join_markup([_controls(view), *coloured, figure, tag("noscript", tag("p", note))])
 
 
 def _legend(picture: PathPicture, has_marks: bool) -> Markup:

@@ -71,10 +71,11 @@ class PathViewData(TypedDict):
 
 
 class PathView(NamedTuple):
-    """Data of the view, and the initial drawing of the robot."""
+    """Data of the view, the initial drawing of the robot, and the index of the sample of each frame."""
 
     data: PathViewData
     drawing: Drawing
+    shown: list[int]
 
 
 def path_view(picture: PathPicture) -> PathView | None:
@@ -124,6 +125,7 @@ def path_view(picture: PathPicture) -> PathView | None:
             "frames": [_frame(picture, k, each, size) for k, each in zip(shown, postures, strict=True)],
         },
         drawing,
+        shown,
     )
 
 

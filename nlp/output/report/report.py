@@ -98,11 +98,11 @@ class Report:
         slices = [each for part in self.parts for each in part.slices]
         return bool(slices) and 2 * sum(not each.has_room for each in slices) > len(slices)
 
-    def as_data(self) -> dict[str, Any]:
-        """Return the data for the script of the page, as JSON types."""
+    def as_data(self, *, is_live: bool = False) -> dict[str, Any]:
+        """Return the data for the script of the page, as JSON types; a live view replaces the data of the 3-D views."""
         return {
             "result": json_data(self.result),
-            "views": [view for part in self.parts for view in part.views],
+            "views": [] if is_live else [view for part in self.parts for view in part.views],
             "planes": [[_plane(part, plane) for plane in part.planes] for part in self.parts],
         }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from ..pictures.figures import picture
 from ..pictures.style import RATE_COLOURS
@@ -56,8 +57,11 @@ def drawings(report: Report) -> Markup:
     return join_markup([tag("p", words, class_="flat-words", role="status"), *stills])
 
 
-def robot_section(report: Report) -> Markup:
-    """Return the 3-D view with its controls and legend, and the table of rates."""
+def robot_section(report: Report, *, is_live: bool = False) -> Markup:
+    """Return the 3-D view with its controls and legend, and the table of rates.
+
+    With a live view, the section has drawings instead of the 3-D view, and the table of rates of each task.
+    """
     views = [view for part in report.parts for view in part.views]
     if not views:
         return paragraphs(["No picture: the robot does not exist at the final point of the search."])
@@ -65,6 +69,8 @@ def robot_section(report: Report) -> Markup:
     head: list[Markup] = []
     if not report.is_answer:
         head.append(tag("p", "Final point of the search, not an optimum.", class_="warning"))
+    if is_live:
+        return join_markup([*head, *_still_parts(report)])
     if len(report.parts) > 1:
         options = [tag("option", part.name, value=k) for k, part in enumerate(report.parts) if part.views]
         head.append(
@@ -96,7 +102,25 @@ def robot_section(report: Report) -> Markup:
     return join_markup([*content, tag("noscript", tag("p", note))])
 
 
-def _legend(view: ViewData) -> Markup:
+def _still_parts(report: Report) -> Iterator[Markup]:
+    """Yield a drawing and the table of rates for each task and pose of the design."""
+    shown = 0
+    for part in report.parts:
+        for view, drawing in zip(part.views, part.drawings, strict=True):
+            several = len(report.parts) > 1 or report.case.poses_per_task > 1
+            words = view["pose_words"] if report.case.poses_per_task > 1 else f"“{view['name']}”"
+            if several:
+                yield tag("h3", f"{words}, worst pose" if view["is_worst"] else words)
+            if shown < _DRAWINGS:
+                source = image_source(_with_fewer_digits(picture([drawing], ".svg")))
+                image = tag("img", src=source, alt=f"Robot, {words}", class_="design")
+                yield tag("figure", image, tag("figcaption", _legend(view, is_still=True)))
+            shown += 1
+            if view["rows"]:
+                yield _rates(view, None if several else "rates")
+
+
+def _legend(view: ViewData, *, is_still: bool = False) -> Markup:
     """Return the legend of the colours and lines of the view."""
     gradient = f"background:linear-gradient(90deg,{','.join(RATE_COLOURS)})"
     bar = tag("span", class_="scale", style=gradient, aria_hidden="true")
@@ -116,8 +140,8 @@ def _legend(view: ViewData) -> Markup:
         if view["motion"] and len(view["frames"]) == 1
         else "",
         joints,
-        f" Tooltips: {view['measure']['words']}, rate, share of F and wrench of a limb",
-        "; kind of a joint. " if view["joints"] else ". ",
+        "" if is_still else f" Tooltips: {view['measure']['words']}, rate, share of F and wrench of a limb",
+        " " if is_still else "; kind of a joint. " if view["joints"] else ". ",
         forces,
     ]
     return join_markup([bar, *words])
@@ -130,8 +154,13 @@ def _measure_header(view: ViewData) -> str:
     return f"{words}, {units.pop()}" if len(units) == 1 else words
 
 
-def _rates(view: ViewData) -> Markup:
-    """Return the table of the rates at the shown posture; the script updates it as the platform moves."""
+def _rates(view: ViewData, anchor: str | None = "rates") -> Markup:
+    """Return the table of the rates at the shown posture; the script updates it as the platform moves.
+
+    Args:
+        view: view with its postures.
+        anchor: identifier of the table; None for one of several tables, which the script does not update.
+    """
     frame = view["frames"][view["zero"]]
     # If the task's motion is free, the rates are rounding errors.
     rates = [rate if abs(rate) > frame["noise"] else 0.0 for rate in frame["rates"]]
@@ -167,9 +196,9 @@ def _rates(view: ViewData) -> Markup:
     caption = tag(
         "caption",
         "F = ",
-        tag("span", f"{frame['F'] if total > 0 else 0:.7g} {view['objective_unit']}".rstrip(), id="F-there"),
+        tag("span", f"{frame['F'] if total > 0 else 0:.7g} {view['objective_unit']}".rstrip(), id=anchor and "F-there"),
         ", platform ",
-        tag("span", frame["words"], id="where"),
+        tag("span", frame["words"], id=anchor and "where"),
     )
-    table = tag("table", caption, tag("thead", head), tag("tbody", *body), id="rates")
+    table = tag("table", caption, tag("thead", head), tag("tbody", *body), id=anchor)
     return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label="Limb rates at the shown pose")

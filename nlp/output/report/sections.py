@@ -157,15 +157,15 @@ def published_section(report: Report) -> Markup:
     return html_table(published_table(report.check), caption, id="compared")
 
 
-def sections(report: Report) -> list[tuple[str, str, Markup]]:
+def sections(report: Report, *, is_live: bool = False) -> list[tuple[str, str, Markup]]:
     """Return anchor, heading and content of every section; some have no content.
 
     The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the
-    data to repeat the solve.
+    data to repeat the solve. A live view replaces the 3-D view.
     """
     return [
         ("case", "Problem", _case(report)),
-        ("robot", "Robot and task motion", robot_section(report)),
+        ("robot", "Robot and task motion", robot_section(report, is_live=is_live)),
         ("result", "Result", _result(report)),
         ("evidence", "Evidence of optimality", evidence_section(report)),
         ("certificate", "Certificate of the global optimum", certificate_section(report)),

@@ -175,7 +175,9 @@ class ToleranceLayout(NamedTuple):
         table, first, last = self.layout.table, self.posed, self.posed + self.settings
         function = ca.Function("numbers", [table.variables_vector, table.arguments_vector], [expression])
         numbers = ca.vertcat(SX(0, 1), *[SX(each) for each in table.values])
-        return function.call([ca.vertcat(pose[first:last], errors, pose[:first], pose[last:]), numbers])[0]
+        # With rows alone, an empty part of a single symbol would have one row.
+        parts = pose[first:last, :], errors, pose[:first, :], pose[last:, :]
+        return function.call([ca.vertcat(*parts), numbers])[0]
 
     def near_zero(self, expression: SX, design: Layout) -> FloatArray:
         """Return smoothing terms (m,) for the norms of the derivatives g_j of an expression (1, 1).

@@ -1,5 +1,6 @@
 // Bars of limits with editable values, and of actuator forces and speeds.
 import { digits, parsed, settled } from "./numbers.js";
+import { limitStatesOf } from "./limits.js";
 import { limitName } from "./names.js";
 import { byId, make, say } from "./panel.js";
 
@@ -18,7 +19,7 @@ export class LimitBars {
   }
 
   refresh() {
-    const states = this.state.limitStates();
+    const states = limitStatesOf(this.state.module, this.state.sides);
     for (const each of states) {
       if (!this.rows.has(each.key)) this.add(each);
       const { element, value, fill, mark, entry } = this.rows.get(each.key);
@@ -36,7 +37,7 @@ export class LimitBars {
     return states;
   }
 
-  /** @param {import("./state.js").LimitState} each */
+  /** @param {import("./limits.js").LimitState} each */
   add(each) {
     const { state } = this, value = make("output", { class: "value" });
     const fill = make("i", {}), mark = make("b", {}), bar = make("span", { class: "track" }, fill, mark);
@@ -84,10 +85,10 @@ export const showActuators = (state) => {
     columns.forEach(({ values, kind }, i) => {
       const largest = Math.max(...values.map(Math.abs)), limit = limitOf(state, kind, each.name), value = settled(values[k], largest);
       const part = Math.abs(value) / (Number.isFinite(limit) ? limit : largest || 1), factor = kind === "actuator_speed" ? each.factor : 1;
-      const [text, track] = row.children[i + 1].children;
+      const [text, track] = /** @type {HTMLCollectionOf<HTMLElement>} */ (row.children[i + 1].children), fill = /** @type {HTMLElement} */ (track.firstChild);
       const isOver = part > 1 + 1e-6 && Number.isFinite(limit);
       say(text, `${digits(value * factor, 5)}${isOver ? " violated" : ""}`);
-      track.firstChild.style.width = `${Math.min(100, 100 * part).toFixed(1)}%`;
+      fill.style.width = `${Math.min(100, 100 * part).toFixed(1)}%`;
       track.title = Number.isFinite(limit) ? `${digits(100 * part, 3)} % of the limit` : `${digits(100 * part, 3)} % of the largest`;
       row.children[i + 1].classList.toggle("violated", isOver);
     });

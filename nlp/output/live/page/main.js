@@ -1,5 +1,6 @@
 // The live page: loads the module, and shows the state after each change.
 import { CaseModule } from "./module.js";
+import { measuredSide } from "./limits.js";
 import { State } from "./state.js";
 import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
 import { axesOf, colourOf, conesOf, extentOf, piecesOf, robotOf } from "./scene.js";
@@ -9,6 +10,8 @@ import { TaskSliders } from "./tasks.js";
 import { LimitBars, showActuators } from "./bars.js";
 import { addJumps } from "./jumps.js";
 import { ValueMap } from "./map.js";
+import { Player } from "./play.js";
+import { Track } from "./track.js";
 import { plus } from "./numbers.js";
 
 /** Bytes from base64, unpacked. @param {string} text */
@@ -53,22 +56,23 @@ const limbValues = (view) => {
 /** Half angle of a joint's cone, and whether its limit is violated there at the shown pose. @param {string} key @param {number} index */
 const coneLimit = (key, index) => {
   if (!state) return null;
-  const own = state.sides.filter((/** @type {any} */ each) => each.key === key), count = own.length / data.poses;
+  const own = state.sides.filter((each) => each.key === key), count = own.length / data.poses;
   const side = own[state.pose * count + index];
   if (!side) return null;
-  const { limit, margin } = state.measure(side);
+  const { limit, margin } = measuredSide(state.module, side);
   return { limit, isViolated: margin < -1e-6 };
 };
 
 const draw = () => {
-  const view = state ? state.module.arrays.view : data.view;
+  const view = player?.view ?? (state ? state.module.arrays.view : data.view);
   const robot = robotOf(view, data.blocks, data.scene), values = limbValues(view);
   const p = state ? state.module.arrays.p : data.p;
   const task = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
-  const twist = data.is_stated ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
+  const twist = data.is_stated && !track ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
-  if (!picture.fitted.length) picture.fitted = extentOf(robot, data.scene, twist);
+  if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];
   const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist, cones: conesOf(view, data, coneLimit) });
+  if (track) pieces.push(...track.pieces(axes, palette)), pieces.sort((a, b) => a.depth - b.depth);
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();
   for (const link of data.scene.links) {
@@ -88,6 +92,7 @@ const show = () => {
     showValues(state, bars?.refresh() ?? []);
     showActuators(state);
     map?.refresh();
+    track?.refresh();
     const isEvaluated = state.mode === "evaluate";
     byId("mode-solve").setAttribute("aria-pressed", String(!isEvaluated));
     byId("mode-evaluate").setAttribute("aria-pressed", String(isEvaluated));
@@ -102,6 +107,10 @@ let map;
 let fields;
 /** @type {LimitBars | undefined} */
 let bars;
+/** @type {Player | undefined} */
+let player;
+/** @type {Track | undefined} */
+let track;
 /** @type {Map<any, () => void>} */
 const pending = new Map();
 /**
@@ -110,6 +119,8 @@ const pending = new Map();
  * @param {any} [key]
  */
 const change = (act, key = Symbol("change")) => {
+  // Any other change ends a motion, at the pose where it began.
+  if (key !== player) player?.stop();
   pending.set(key, act);
   if (isWaiting) return;
   isWaiting = true;
@@ -219,10 +230,19 @@ if (data.has_module) {
   fields = new TaskSliders(state, change);
   map = new ValueMap(state, change);
   addJumps(state, change);
+  player = new Player(state, data, change);
   listen();
+  if (data.track) {
+    track = new Track(state, data.track, change, globalThis.document);
+    // The pose is that of the path, and the picture contains the path.
+    picture.grab = null;
+    picture.fitted = [];
+  }
   document.documentElement.classList.add("live");
   document.documentElement.classList.toggle("no-slopes", !data.has_slopes);
-  Object.assign(globalThis, { screwsynth: { state, show, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
+  Object.assign(globalThis, { screwsynth: { state, show, player, track, place: () => picture.last.place(robotOf(loaded.arrays.view, data.blocks, data.scene).position) } });
   show();
+} else {
+  player = new Player(null, data, change);
 }
 document.documentElement.dataset.ready = "yes";

@@ -113,7 +113,7 @@ export class Sliders {
   }
 }
 
-/** Headline, and the values of the point. @param {State} state @param {import("./state.js").LimitState[]} limits */
+/** Headline, and the values of the point. @param {State} state @param {import("./limits.js").LimitState[]} limits */
 export const showValues = (state, limits) => {
   const { data, module } = state, { singular_values } = module.arrays;
   const { word, words, isFault } = state.headline();

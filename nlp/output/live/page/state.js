@@ -1,5 +1,6 @@
 // State of a live page: values, held sliders and limits; solve and evaluation; the state as text.
 import { STATUSES } from "./module.js";
+import { leastMarginOf, sidesOf } from "./limits.js";
 
 /**
  * @typedef {{ name: string, set: string, group: string, unit: string, factor: number, vector: "x" | "p", index: number,
@@ -7,13 +8,9 @@ import { STATUSES } from "./module.js";
  * @typedef {{ key: string, unit: string, factor: number, value: number, above: number | null, most: number | null }} Limit
  * @typedef {{ name: string, keys: string[], reading: number, low: number | null, high: number | null, unit: string,
  *   factor: number, constraint: number }} Row
- * @typedef {{ key: string, name: string, side: "min" | "max", limit: number, value: number, unit: string, factor: number,
- *   isViolated: boolean, settable: number }} LimitState
  * @typedef {"program" | "optimum" | "point" | "none"} Kind
  */
 
-/** Violation of a limit, relative to it, that counts as rounding. */
-const ROUNDING = 1e-6;
 /** F below this part of its terms is rounding error, as in `nlp/evidence/state.py`. */
 const ZERO_F = 1e-12;
 /** Seeds of a solve that follows a slider where the search from the last point fails. */
@@ -55,7 +52,7 @@ export class State {
     this.weights = [];
     /** Words about the point from the search that led to it. */
     this.remark = "";
-    this.sides = this.sidesOfRows();
+    this.sides = sidesOf(data.rows, this.limits);
     /** @type {number[][]} other local optima */
     this.others = [];
     this.jump("answer");
@@ -185,18 +182,6 @@ export class State {
     this.others = [];
     this.update(null);
     return true;
-  }
-
-  /** Values of limits with a stated side, in the order of the rows. */
-  sidesOfRows() {
-    return this.data.rows.flatMap((/** @type {Row} */ row) =>
-      /** @type {const} */ (["min", "max"]).flatMap((side) => {
-        const stated = side === "min" ? row.low : row.high;
-        if (stated === null) return [];
-        const key = row.keys[side === "min" ? 0 : 1] || `${row.name}.${side}`;
-        return [{ row, side, stated, key, settable: this.limits.findIndex((each) => each.key === key) }];
-      }),
-    );
   }
 
   restoreRows() {
@@ -448,43 +433,9 @@ export class State {
     return true;
   }
 
-  /**
-   * Value of a side of a limit: limit and value in units of computations, excess over the limit, and relative margin.
-   * @param {{ row: Row, side: "min" | "max", stated: number, settable: number }} each
-   */
-  measure({ row, side, stated, settable }) {
-    const { readings, limits, g, g_lower, g_upper } = this.module.arrays, sign = side === "min" ? 1 : -1;
-    const limit = settable < 0 ? stated : limits[settable], k = row.constraint;
-    if (row.reading >= 0) {
-      const value = readings[row.reading], size = Math.max(Math.abs(limit), Math.abs(value)) || 1;
-      return { limit, value, margin: (sign * (value - limit)) / size };
-    }
-    if (k < 0) return { limit, value: NaN, margin: 0 };
-    const bound = (side === "min" ? g_lower : g_upper)[k], size = Math.max(Math.abs(bound), Math.abs(g[k])) || 1;
-    return { limit, value: NaN, margin: (sign * (g[k] - bound)) / size };
-  }
-
   /** Smallest relative margin of all limits, negative for a violated one; Infinity without limits. */
   leastMargin() {
-    let least = Infinity;
-    for (const each of this.sides) {
-      const { margin } = this.measure(each);
-      if (!(margin >= least)) least = Number.isNaN(margin) ? -Infinity : margin;
-    }
-    return least;
-  }
-
-  /** Limits with the value that is nearest to each, violated or not. @returns {LimitState[]} */
-  limitStates() {
-    /** @type {Map<string, LimitState>} */
-    const found = new Map(), margins = new Map();
-    for (const each of this.sides) {
-      const { key, row, side, settable } = each, { limit, value, margin } = this.measure(each);
-      if (found.has(key) && margin >= margins.get(key)) continue;
-      margins.set(key, margin);
-      found.set(key, { key, name: row.name, side, limit, value, unit: row.unit, factor: row.factor, isViolated: margin < -ROUNDING, settable });
-    }
-    return [...found.values()];
+    return leastMarginOf(this.module, this.sides);
   }
 
   /** F at the point; 0 where it is rounding error of its terms, as in the terminal. */

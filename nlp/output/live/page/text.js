@@ -62,10 +62,11 @@ export const caseFileOf = (state) => {
   if (!state.data.case_parts) return "";
   const values = new Map(settingsOf(state).map(([name, value]) => [name, value]));
   for (const slider of state.sliders) if (slider.set) values.set(slider.set, String(state.read(slider)));
-  for (const [name, value] of taskSettings(state, true)) values.set(name, value);
+  // The weights of the case are scaled in the module, so only changed ones take the place of the stated ones.
+  for (const [name, value] of taskSettings(state, true)) if (!name.endsWith(".weight")) values.set(name, value);
   state.limits.forEach((limit, k) => values.set(`limits.${limit.key}`, String(state.module.arrays.limits[k] * limit.factor)));
   return state.data.case_parts
-    .map((/** @type {string | { set: string }} */ part) => (typeof part === "string" ? part : tomlNumber(values.get(part.set) ?? "0", part.set)))
+    .map((/** @type {string | { set: string, stated?: string }} */ part) => (typeof part === "string" ? part : tomlNumber(values.get(part.set) ?? part.stated ?? "0", part.set)))
     .join("");
 };
 

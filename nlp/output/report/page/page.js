@@ -285,7 +285,9 @@
     map();
   }
 
-  afterPaint(async () => {
+  // A page with a live view and without maps needs no library.
+  if (!view && !byId("pair")) document.documentElement.dataset.drawn = "yes";
+  else afterPaint(async () => {
     if (view && !hasWebGL()) throw new Error("no WebGL");
     if (view) {
       byId("view").textContent = "";
