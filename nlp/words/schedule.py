@@ -30,7 +30,11 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
     name, segments = objective_name(case), schedule.segments
     where = f"along {segments:,} segment{'s' * (segments != 1)}"
     unit = unit_of_objective(case) if case.tasks[0].measure else ""
-    yield Line(f"{name} = {number(schedule.value)}{f' {unit}' if unit else ''}", tone=Tone.ANSWER, after=f" {where} ({_gain(schedule)})")
+    yield Line(
+        f"{name} = {number(schedule.value)}{f' {unit}' if unit else ''}",
+        tone=Tone.ANSWER,
+        after=f" {where} ({_gain(schedule)})",
+    )
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"

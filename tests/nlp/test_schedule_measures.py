@@ -57,9 +57,7 @@ def _forces(poses: Poses, turns: FloatArray) -> FloatArray:
     ("lean", "over", "held", "value"),
     [(40, "worst", 15.7338, 15.4329), (30, "worst", 13.0828, 13.0268), (30, "mean", 12.84557, 12.78481)],
 )
-def test_largest_strut_force_in_any_direction(
-    tmp_path: Path, lean: int, over: str, held: float, value: float
-) -> None:
+def test_largest_strut_force_in_any_direction(tmp_path: Path, lean: int, over: str, held: float, value: float) -> None:
     case = load_case(str(_written(tmp_path, *_minimised("actuator_force", over, _ANY_FORCE), count=200, lean=lean)))
     schedule = solve(case).schedule
     assert schedule is not None
@@ -100,9 +98,7 @@ def test_bound_of_the_largest_force_is_not_above_the_schedule(tmp_path: Path, cl
 @pytest.mark.parametrize("measure", ["actuator_speed", "actuator_power"])
 def test_speeds_and_powers_equal_those_of_the_inverse_jacobian(tmp_path: Path, measure: str) -> None:
     tables = '[[load]]\nname = "weight"\nforce = [0, 3, -20]\n\n[motion]\nlinear = 2\nangular = 3\n'
-    problem = schedule_problem(
-        load_case(str(_written(tmp_path, *_minimised(measure, "worst", tables), count=12)))
-    )
+    problem = schedule_problem(load_case(str(_written(tmp_path, *_minimised(measure, "worst", tables), count=12))))
     turns = np.linspace(-0.4, 0.5, len(problem.points))
     found = -problem.combined(problem.at(np.zeros(0), turns[:, None]).objective)
     for value, p, R, s in zip(found, problem.points.positions, problem.points.rotations, turns, strict=True):
