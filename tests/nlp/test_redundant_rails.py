@@ -26,13 +26,13 @@ def _with_rails(folder: Path, half: float, sense: str = "max") -> Path:
 def test_rails_are_variables(tmp_path: Path, sense: str, F: float) -> None:
     solution = solve(load_case(str(_with_rails(tmp_path, 0.2, sense))))
     assert solution.status.value == "optimal"
-    assert solution.F == pytest.approx(F, abs=1e-6)
+    assert pytest.approx(F, abs=1e-6) == solution.F
 
 
 def test_rails_that_hardly_move_have_the_F_of_home(tmp_path: Path) -> None:
     solution = solve(load_case(str(_with_rails(tmp_path, 1e-6))))
     assert solution.status.value != "infeasible"
-    assert solution.F == pytest.approx(1.487434, abs=2e-6)
+    assert pytest.approx(1.487434, abs=2e-6) == solution.F
 
 
 def test_limbs_with_rails_are_evaluated(cli: Run) -> None:
@@ -44,4 +44,4 @@ def test_limbs_with_rails_are_evaluated(cli: Run) -> None:
 @pytest.mark.soak
 def test_twenty_independent_turns_reach_the_sum_of_their_optima() -> None:
     # Each pose has its own turn, so the optimum is that of every pose alone.
-    assert solve(load_case(str(_DATA / "twenty-turns.toml"))).F == pytest.approx(1.867166, abs=1e-6)
+    assert pytest.approx(1.867166, abs=1e-6) == solve(load_case(str(_DATA / "twenty-turns.toml"))).F
