@@ -101,18 +101,16 @@ def _search(
         low, high = low + [-end for end in ends_of_rates], high + ends_of_rates
     x0 = np.concatenate([(d - centre[:n]) / half[:n], ((s[:rows] - centre[n:]) / half[n:]).ravel()])
     lbx, ubx = -np.ones(len(x0)), np.ones(len(x0))
-    weights = ca.DM(problem.points.weights)
     if levels:
-        first = start if levels > 1 else start.min(keepdims=True)
         least = -math.inf if at_least is None else at_least / size
-        x0 = np.append(x0, np.maximum(first / size, least))
+        x0 = np.append(x0, np.maximum((start if levels > 1 else start.min(keepdims=True)) / size, least))
         lbx, ubx = np.append(lbx, [least] * levels), np.append(ubx, [math.inf] * levels)
         t = x[n + rows * k :]
         g.append(_above_levels(weighted / size, t))
         low, high = low + [0.0] * (T * count), high + [math.inf] * (T * count)
-        objective = -ca.dot(t, weights) if levels > 1 else -t
+        objective = -ca.dot(t, ca.DM(problem.points.weights)) if levels > 1 else -t
     else:
-        objective = -ca.dot(ca.sum1(weighted).T, weights) / size
+        objective = -ca.dot(ca.sum1(weighted).T, ca.DM(problem.points.weights)) / size
         if at_least is not None:
             g.append(ca.vec(weighted) / size)
             low, high = low + [at_least / size] * (T * count), high + [math.inf] * (T * count)
