@@ -29,7 +29,7 @@ def test_rails_are_variables(tmp_path: Path, sense: str, F: float) -> None:
     assert pytest.approx(F, abs=1e-6) == solution.F
 
 
-def test_rails_that_hardly_move_have_the_F_of_home(tmp_path: Path) -> None:
+def test_rails_that_hardly_move_equal_home(tmp_path: Path) -> None:
     solution = solve(load_case(str(_with_rails(tmp_path, 1e-6))))
     assert solution.status.value != "infeasible"
     assert pytest.approx(1.487434, abs=2e-6) == solution.F

@@ -218,7 +218,7 @@ def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, mos
         fine: If false, a coarser grid.
         most: largest number of constants.
     """
-    low, high, first = ends(problem.settings)
+    first = ends(problem.settings)[2]
     if not len(first):
         return [first]
     if len(first) > 1:

@@ -101,26 +101,22 @@ def _search(
         low, high = low + [-end for end in ends_of_rates], high + ends_of_rates
     x0 = np.concatenate([(d - centre[:n]) / half[:n], ((s[:rows] - centre[n:]) / half[n:]).ravel()])
     lbx, ubx = -np.ones(len(x0)), np.ones(len(x0))
-    weights = ca.DM(problem.points.weights)
     if levels:
-        first = start if levels > 1 else start.min(keepdims=True)
         least = -math.inf if at_least is None else at_least / size
-        x0, lbx = np.append(x0, np.maximum(first / size, least)), np.append(lbx, np.full(levels, least))
-        ubx = np.append(ubx, np.full(levels, math.inf))
+        x0 = np.append(x0, np.maximum((start if levels > 1 else start.min(keepdims=True)) / size, least))
+        lbx, ubx = np.append(lbx, [least] * levels), np.append(ubx, [math.inf] * levels)
         t = x[n + rows * k :]
-        above = ca.repmat(t.T, T, 1) if levels > 1 else ca.repmat(t, T, count)
-        g.append(ca.vec(weighted / size - above))
+        g.append(_above_levels(weighted / size, t))
         low, high = low + [0.0] * (T * count), high + [math.inf] * (T * count)
-        objective = -ca.dot(t, weights) if levels > 1 else -t
+        objective = -ca.dot(t, ca.DM(problem.points.weights)) if levels > 1 else -t
     else:
-        objective = -ca.dot(ca.sum1(weighted).T, weights) / size
+        objective = -ca.dot(ca.sum1(weighted).T, ca.DM(problem.points.weights)) / size
         if at_least is not None:
             g.append(ca.vec(weighted) / size)
             low, high = low + [at_least / size] * (T * count), high + [math.inf] * (T * count)
     solver = ca.nlpsol("schedule", "ipopt", {"x": x, "f": objective, "g": ca.vertcat(*g)}, _options(near, iterations))
     found = solver(x0=np.clip(x0, lbx, ubx), lbx=lbx, ubx=ubx, lbg=low, ubg=high)
-    point = found["x"].full().ravel()[: n + rows * k]
-    point = np.clip(point, -1.0, 1.0)
+    point = np.clip(found["x"].full().ravel()[: n + rows * k], -1.0, 1.0)
     new = centre[:n] + half[:n] * point[:n], centre[n:] + half[n:] * point[n:].reshape(rows, k)
     low_d, high_d, _ = ends(problem.design)
     low_s, high_s, _ = ends(problem.settings)
@@ -131,6 +127,12 @@ def _search(
     if not problem.is_feasible(d_new, s_new):
         return None
     return Polished(d_new, s_new, problem.value(d_new, s_new))
+
+
+def _above_levels(values: MX, levels: MX) -> MX:
+    """Return values (T, N) minus the level of their point, or minus the only level, as a column."""
+    T, count = values.shape
+    return ca.vec(values - (ca.repmat(levels.T, T, 1) if levels.numel() > 1 else ca.repmat(levels, T, count)))
 
 
 def _rate_rows(problem: ScheduleProblem, s: MX, half: FloatArray) -> tuple[list[MX], list[float]]:
