@@ -256,6 +256,19 @@ def _poses_line(case: Case) -> str:
     return f"Poses: {case.poses_per_task}; F is their {over}. {shown} with the first pose; a slider selects the others."
 
 
+def _variable_lines(case: Case, names: list[str]) -> list[str]:
+    """Return sentences on the variables of a case, or on the settings of a schedule."""
+    if names:
+        lines = [f"{counted(len(names), 'variable')}: {', '.join(names)}. All other parameters are fixed."]
+        turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
+        if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
+            lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
+        return lines
+    if case.settings:
+        return [f"Settings that change along the path: {', '.join(case.settings)}."]
+    return ["No variables: the robot is evaluated at the stated dimensions and pose."]
+
+
 def _case(report: Report) -> Markup:
     """Return the problem of the case in sentences."""
     case, first = report.case, report.parts[0]
@@ -273,15 +286,7 @@ def _case(report: Report) -> Markup:
     chosen = [each.name for each in catalogue_dimensions(case)]
     if chosen:
         lines.append(f"Variables with listed values: {', '.join(chosen)}.")
-    if names:
-        lines.append(f"{counted(len(names), 'variable')}: {', '.join(names)}. All other parameters are fixed.")
-        turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
-        if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
-            lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
-    elif case.settings:
-        lines.append(f"Settings that change along the path: {', '.join(case.settings)}.")
-    else:
-        lines.append("No variables: the robot is evaluated at the stated dimensions and pose.")
+    lines += _variable_lines(case, names)
     if case.changes:
         lines.append(f"Set for each task: {', '.join(case.changes)}.")
     if case.poses_per_task > 1:
