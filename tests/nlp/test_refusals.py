@@ -55,7 +55,7 @@ REFUSALS = {
         changed('name = "screw"', 'nmae = "screw"'),
         (
             "case.toml: task[0].nmae: no such key; did you mean 'name'? allowed: name, sense, axis, "
-            "point, pitch, weight, twist"
+            "point, pitch, weight, twist, follows"
         ),
     ),
     "missing table": (
