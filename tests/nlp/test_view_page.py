@@ -484,7 +484,10 @@ def test_a_chosen_task_shows_its_robot(live: Callable[..., Live], tmp_path: Path
     # The squared rates of a task are its F, at the optimum the worst case times the weight.
     weights = read(SECTION_4_3).tasks
     total = sum(task.weight for task in weights)
-    scaled = [sum(rate**2 for rate in each) * total / 2 / task.weight for each, task in zip((before, after), weights, strict=True)]
+    scaled = [
+        sum(rate**2 for rate in each) * total / 2 / task.weight
+        for each, task in zip((before, after), weights, strict=True)
+    ]
     assert min(scaled) == pytest.approx(page.F, rel=1e-6)
     assert page.faults == []
 

@@ -379,7 +379,9 @@ def _pose_words(data: ViewData) -> list[str]:
     names = [data["tasks"][task]["name"] for task in tasks]
     if len(set(tasks)) == len(tasks):
         return names
-    return [f"{name}, pose {tasks[: k + 1].count(task)}" for k, (name, task) in enumerate(zip(names, tasks, strict=True))]
+    return [
+        f"{name}, pose {tasks[: k + 1].count(task)}" for k, (name, task) in enumerate(zip(names, tasks, strict=True))
+    ]
 
 
 def _players(case: Case) -> Iterable[Markup]:

@@ -241,7 +241,9 @@ def _objective_lines(case: Case) -> Iterator[str]:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        motion = f"motion that follows the {task.follows}" if task.follows else task_words(task_data(case, k), case.units)
+        motion = (
+            f"motion that follows the {task.follows}" if task.follows else task_words(task_data(case, k), case.units)
+        )
         yield f"Task “{task.name}”: F {word} for a {motion}."
     yield "F is the sum of the squared rates at which the limbs' unit wrenches do work in the task's motion."
 
