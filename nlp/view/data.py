@@ -147,8 +147,8 @@ class QuantityData(TypedDict):
 class ViewData(TypedDict):
     """Everything that a live page needs besides its module and its drawing.
 
-    ``stated_poses`` has the index of the stated pose of each pose. ``pose_tasks`` has the index of its task if dimensions
-    or the pose change from task to task, and is empty otherwise.
+    ``stated_poses`` has the index of the stated pose of each pose. ``pose_tasks`` has the index of its task if
+    dimensions or the pose change from task to task, and is empty otherwise.
     """
 
     arrays: list[ArrayData]

@@ -27,8 +27,8 @@ from ...system.jsonvalues import json_data
 from ...words.numbers import number
 from ...words.objective import objective_label
 from ..pictures.drawing import Drawing, drawing_of
-from ..pictures.posture import states_at_poses, worst_pose
 from ..pictures.figures import picture_of
+from ..pictures.posture import states_at_poses, worst_pose
 from ..pictures.schedules import figure_of_schedule
 from .frames import PoseView, ViewData, view_data
 from .slices import Plane, Slice, has_loops, planes_of, slices_of

@@ -256,6 +256,13 @@ def _poses_line(case: Case) -> str:
     return f"Poses: {case.poses_per_task}; F is their {over}. {shown} with the first pose; a slider selects the others."
 
 
+def _fixed_words(case: Case) -> str:
+    """Return what changes in a case without variables: its settings, or nothing."""
+    if case.settings:
+        return f"Settings that change along the path: {', '.join(case.settings)}."
+    return "No variables: the robot is evaluated at the stated dimensions and pose."
+
+
 def _case(report: Report) -> Markup:
     """Return the problem of the case in sentences."""
     case, first = report.case, report.parts[0]
@@ -278,10 +285,8 @@ def _case(report: Report) -> Markup:
         turns = [pose.rotation for pose in case.poses if pose.rotation.axis is None]
         if any(sizes_of_turn(turn.angle)[1] > 0 for turn in turns):
             lines.append("q is the vector part of the unit quaternion of the platform's rotation.")
-    elif case.settings:
-        lines.append(f"Settings that change along the path: {', '.join(case.settings)}.")
     else:
-        lines.append("No variables: the robot is evaluated at the stated dimensions and pose.")
+        lines.append(_fixed_words(case))
     if case.changes:
         lines.append(f"Set for each task: {', '.join(case.changes)}.")
     if case.poses_per_task > 1:
