@@ -110,7 +110,7 @@ def _names(case: Case, item: Parameter) -> list[list[str]]:
 
 
 def _assigned(line: str, names: Sequence[Sequence[str]]) -> Iterator[str | SetPart]:
-    """Yield a line with values in place of its own: a number or a list, each with a value for each task if it changes."""
+    """Yield a line with values in place of its own: a number or a list, each with a value for each task if needed."""
     yield f"{line.partition(' = ')[0]} = {'[' if len(names) > 1 else ''}"
     for k, several in enumerate(names):
         yield ", " if k else ""
