@@ -604,13 +604,17 @@ def test_a_table_as_csv_has_every_digit(tmp_path: Path, cli: Run) -> None:
     assert target.read_text(encoding="utf-8").startswith("task,sense,weight,F,separate optimum,loss,")
 
 
-@pytest.mark.parametrize("command", ["solve", "evaluate"])
-def test_csv_that_cannot_be_is_refused_first(command: str, tmp_path: Path, cli: Run, monkeypatch: Patch) -> None:
+@pytest.mark.parametrize(
+    ("command", "outputs"), [("solve", "--json -, --csv - and --schedule -"), ("evaluate", "--json - and --csv -")]
+)
+def test_csv_that_cannot_be_is_refused_first(
+    command: str, outputs: str, tmp_path: Path, cli: Run, monkeypatch: Patch
+) -> None:
     monkeypatch.chdir(tmp_path)
     for options, words in (
         ("--table limbs", "--table limbs: needs --csv FILE"),
         ("--csv x.csv --table legs", "--table legs: must be one of design, limbs"),
-        ("--csv - --json -", "one of --json - and --csv - can go to standard output"),
+        ("--csv - --json -", f"one of {outputs} can go to standard output"),
         ("--csv nowhere/x.csv", "nowhere/x.csv: cannot be written"),
     ):
         refusal_of(cli(command, "paper-4.1-helical", *options.split()), words)
