@@ -309,7 +309,7 @@ def designs_on(points: Points, F: Sequence[float], active: Iterable[tuple[str, .
 def test_axes_of_a_sweep_have_units() -> None:
     found = designs_on(grid(["limits.leg_length.max=32,34", "task.pitch=0.1,0.2"]), [1.0] * 4, [()] * 4)
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
-    assert labels[0] == ("maximum leg length, in", "task.pitch, in/rad")
+    assert labels[0] == ("maximum leg length, in", "task pitch, in/rad")
     found = designs_on(grid(["x3=1,2", "x1=30,31"]), [1.0] * 4, [()] * 4)
     labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in designs_figure(found).axes]
     assert labels[0] == ("x3, deg", "x1, in")
