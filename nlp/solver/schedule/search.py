@@ -6,7 +6,6 @@ there. The best one is searched once more on a finer grid.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....models import FloatArray
+from ....models.mechanism.motions import rotation_matrix
 from ....models.rotation import axis_angle_from_matrix
 from ...case.case import Case
 from ...case.pathfile import TURN
@@ -213,7 +213,7 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
         turn = case.path.tool.turn
         axis = rotation @ local
-        rotation = rotation @ _turned(local, values[TURN] if isinstance(turn, Free) else float(turn))
+        rotation = rotation @ rotation_matrix(local * (values[TURN] if isinstance(turn, Free) else float(turn)))
     task = case.tasks[0]
     p = points.positions[0]
     twists = {
@@ -235,10 +235,3 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         over_path=None,
         method=Case.method,
     )
-
-
-def _turned(axis: FloatArray, angle: float) -> FloatArray:
-    """Return the rotation matrix (3, 3) of an angle about a unit axis (3,)."""
-    x, y, z = axis.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
