@@ -10,8 +10,8 @@ the place of the sum. The function is mapped over the points, so its expressions
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from ....models.values import dataclass
 from ...case.case import Case
 from ...case.choices import check_no_catalogue
 from ...case.forces import forces_at
-from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
+from ...case.limits.constraint import NUMBER, BoundedConstraint, Extent, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ...case.limits.singular_values import smallest_eigenvalue
 from ...case.pathfile import TURN
@@ -41,6 +41,8 @@ from ...program.layout import reference_of
 
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
+#: Number of mapped functions that are kept: their construction takes longer than a call with few points.
+_MAPS = 4
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
 #: Rounding of a difference of two settings, relative to the largest setting.
@@ -110,6 +112,8 @@ class ScheduleProblem:
         limits: (c, 1) limits as expressions that must be at most 0.
         of_design: (b, 1) limits of the design alone, at most 0.
         names: names of the limits.
+        lengths: (l, 1) values at a point of which a limit compares the smallest with the largest one, such as a stroke.
+        extents: limits on each of these values.
         are_exact: (c,) whether each limit is on the quantity of the case; false for a limit on a stricter estimate.
         matrix: (m, 6) homogenised J, if its smallest singular value is the objective; otherwise None.
         margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
@@ -125,6 +129,8 @@ class ScheduleProblem:
     limits: SX
     of_design: SX
     names: tuple[str, ...]
+    lengths: SX
+    extents: tuple[tuple[Extent, ...], ...]
     are_exact: tuple[bool, ...]
     matrix: SX | None = None
     margins: FloatArray | None = None
@@ -173,6 +179,11 @@ class ScheduleProblem:
         return ca.Function("point", list(self.symbols), [ca.densify(self.objective), ca.densify(self.limits)])
 
     @cached_property
+    def _mapped(self) -> Callable[[int], ca.Function]:
+        """The function mapped over a number of points; the last maps are kept."""
+        return lru_cache(_MAPS)(self.function.map)
+
+    @cached_property
     def matrix_function(self) -> ca.Function | None:
         """Function of design, settings and the numbers of a point, with the homogenised J (m, 6); None without it."""
         if self.matrix is None:
@@ -189,6 +200,31 @@ class ScheduleProblem:
         found = self.matrix_function.map(count)(design, np.reshape(s, (count, -1)).T, numbers).full()
         return np.asarray(found.reshape(rows, count, columns).transpose(1, 0, 2))
 
+    @cached_property
+    def lengths_function(self) -> ca.Function:
+        """Function of design, settings and the numbers of a point, with the lengths that limits compare."""
+        return ca.Function("lengths", list(self.symbols), [ca.densify(self.lengths)])
+
+    def compared(self, d: FloatArray, s: FloatArray) -> FloatArray:
+        """Return the lengths (N, l) that limits compare, for a design (n,) and settings (N, k)."""
+        count = len(self.points)
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        return np.asarray(self.lengths_function.map(count)(design, s.T, self.numbers).full().T)
+
+    def extent_excess(self, d: FloatArray, s: FloatArray) -> float:
+        """Return the largest relative excess over a limit that compares two points; minus infinity without any."""
+        if not self.extents:
+            return -math.inf
+        lengths = self.compared(d, s)
+        excess = [
+            (largest - each.ratio * smallest - each.most) / abs(each.most)
+            for own, smallest, largest in zip(
+                self.extents, lengths.min(axis=0).tolist(), lengths.max(axis=0).tolist(), strict=True
+            )
+            for each in own
+        ]
+        return float(max(excess))
+
     def at(
         self, d: FloatArray, s: FloatArray, which: Sequence[int] | None = None, *, estimated: bool = False
     ) -> Values:
@@ -198,12 +234,12 @@ class ScheduleProblem:
             d: (n,) design.
             s: (N, k) settings.
             which: indices of the points; all if left out.
-            estimated: If true, the smallest singular value is the smooth estimate of the program, which is not above it.
+            estimated: If true, return the smooth estimate of the smallest singular value, which is not above it.
         """
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
         design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
-        objective, limits = self.function.map(count)(design, np.reshape(s, (count, -1)).T, numbers)
+        objective, limits = self._mapped(count)(design, np.reshape(s, (count, -1)).T, numbers)
         values, matrices = objective.full().T, None if estimated else self.matrices(d, s, numbers)
         if matrices is not None:
             regular = np.isfinite(matrices).all(axis=(1, 2))
@@ -235,6 +271,7 @@ class ScheduleProblem:
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
             and (own <= slack).all()
+            and self.extent_excess(d, s) <= slack
             and (s >= low - rounding).all()
             and (s <= high + rounding).all()
             and (steps <= rounding).all()
@@ -296,6 +333,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     rows = [row for each in stated for row in _rows(each, case.characteristic_length)]
     varying = [bool(ca.depends_on(row.excess, ca.vertcat(s, point))) for row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
+    lengths, extents = _extents(case, robot)
     matrix = _matrix(case, robot)
     values = _values(case, model, robot) if matrix is None else ca.sqrt(smallest_eigenvalue(matrix.T @ matrix))
     weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
@@ -310,6 +348,8 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         limits=ca.vertcat(SX(0, 1), *[row.excess + point[15] for row in at_points]),
         of_design=ca.vertcat(SX(0, 1), *[row.excess for row, own in zip(rows, varying, strict=True) if not own]),
         names=tuple(row.name for row in at_points),
+        lengths=lengths,
+        extents=extents,
         are_exact=tuple(row.is_exact for row in at_points),
         matrix=matrix,
     )
@@ -384,6 +424,13 @@ def _values(case: Case, model: Model, robot: RobotInstance) -> SX:
     return ca.vertcat(*[each.value for each in signed_values(case, forces)])
 
 
+def _extents(case: Case, robot: RobotInstance) -> tuple[SX, tuple[tuple[Extent, ...], ...]]:
+    """Return the values (l, 1) at a point that limits compare between points, and the limits on each of them."""
+    pair = Design(case.as_limited, (robot, robot), {})
+    families = [family for limit in case.limits for family in limit.on_pairs(pair)]
+    return ca.vertcat(SX(0, 1), *[each.values[0] for each in families]), tuple(each.extents for each in families)
+
+
 def _matrix(case: Case, robot: RobotInstance) -> SX | None:
     """Return the homogenised J (m, 6) at a point, if its smallest singular value is the objective; otherwise None.
 
@@ -412,9 +459,6 @@ def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedCon
     ]
     found: list[BoundedConstraint] = []
     for limit in sorted(case.limits, key=attrgetter("order")):
-        if list(limit.on_pairs(Design(case.as_limited, (robot, robot), design.numbers))):
-            fault = "compares two poses, which is not supported with objective.as"
-            raise CaseError(f"limits.{limit.name}", fault, source=case.source)
         found += [item for plate in plates for item in limit.on_plate(plate)]
         found += [*limit.of_design(design), *limit.at_pose(pose)]
     return found
