@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def main() -> None:
         return
     case = load_case("hexapod-yaw")
     _measure("one setting", case)
-    _measure("two settings", case.replace(x1=_RADIUS))
+    _measure("two settings", replace(case, parameters={**case.parameters, "x1": _RADIUS}))
 
 
 def _measure(name: str, case: Case) -> None:

@@ -309,6 +309,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
+    _check_home(case, settings)
     point = SX.sym("point", _POINT)
     position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
     turned, axis = rotation, SX([0.0, 0.0, 1.0])
@@ -362,6 +363,15 @@ def _check_times(case: Case, points: Waypoints) -> None:
     if limited and len(untimed):
         fault = f"needs the time of every segment, which the path does not state; give {limited[0]} the rate inf,"
         raise CaseError(f"{limited[0]}.rate", f"{fault} or state t or feed in the path", source=case.source)
+
+
+def _check_home(case: Case, settings: Sequence[Variable]) -> None:
+    """Refuse a limit on angles from home while a dimension changes, because home states no value of it."""
+    names = [each.name for each in settings if each.name != TURN]
+    for limit in case.limits:
+        if names and limit.reference == "home":
+            fault = f"home has no {names[0]}, which changes along the path; state mounting axes"
+            raise CaseError(f"limits.{limit.name}.about", fault, "home", case.source)
 
 
 def _check_feeds(case: Case, points: Waypoints) -> None:
