@@ -23,7 +23,8 @@ def _turn(text: str) -> list[tuple[str, str]]:
 
 #: Changes of the case, and words of the refusal.
 _CASES: list[tuple[list[tuple[str, str]], str]] = [
-    ([_HOME, _PER_PATH], 'case.toml: limits.base_joint_angle.about = "home": home has no x3, which changes along the path'),
+    ([_HOME, _PER_PATH],
+     'case.toml: limits.base_joint_angle.about = "home": home has no x3, which changes along the path'),
     (_turn("min = 75, max = -75, rate = 5"), "path.tool.turn.min = 75.0: must be below max = -75 deg"),
     (_turn("min = 75, max = 75, rate = 5"), "path.tool.turn.min = 75.0: must be below max = 75 deg"),
     (_turn("min = nan, max = 75, rate = 5"), "path.tool.turn.min = nan: must be finite"),
