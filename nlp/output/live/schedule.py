@@ -195,6 +195,7 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
         "step": _finite(step[shown]),
         "rates": _finite(_rates(along)[shown]),
         "F": schedule.F[along.shown].tolist(),
+        "value": schedule.value,
         "constant": _constant(along),
         "design": {
             "places": [numbers[each.name].index for each in problem.design],
@@ -252,7 +253,7 @@ def _constant(along: _Along) -> dict[str, Any] | None:
     d = np.array([units.to_internal(constant.design[each.name], each.dimension) for each in problem.design])
     found = problem.at(d, np.repeat(row[None, :], len(along.s), axis=0))
     F = along.schedule.sign * problem.combined(found.objective)
-    return {"row": row.tolist(), "design": d.tolist(), "F": F[along.shown].tolist()}
+    return {"row": row.tolist(), "design": d.tolist(), "F": F[along.shown].tolist(), "value": constant.value}
 
 
 def _reach(along: _Along) -> tuple[FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ import { unpack } from "./text.js";
  * @typedef {{ value: string, word: string, words: string }} Told
  * @typedef {Told & { isFault: boolean, isProgram: boolean }} Headline
  * @typedef {{ settings: Setting[], rows: number[][], reach: [number, number][][], step: (number | null)[][], rates: (number | null)[][],
- *   F: number[], constant: { row: number[], design: number[], F: number[] } | null, design: { places: number[], values: number[] },
+ *   F: number[], value: number, constant: { row: number[], design: number[], F: number[], value: number } | null, design: { places: number[], values: number[] },
  *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, isWorst: boolean, sign: number,
  *   unit: string, isTimed: boolean, isAnswer: boolean, name: string, schedule: Told, held: Told | null, maps: MapData[],
  *   table: string | null }} ScheduleData rows, reach and step in units of computations; turn is that of a tool without a setting
@@ -73,13 +73,13 @@ export class Schedule {
   /** Slider over the path below the picture. */
   addTravel() {
     const { frames, first } = this.track, last = frames.length - 1;
-    const pace = make("select", { id: "pace" }, make("option", { value: "real" }, "real time"), make("option", { value: "lap" }, "15 s"));
+    const pace = make("select", { id: "pace" }, make("option", { value: "real" }, "real time"), make("option", { value: "lap" }, "whole path in 15 s"));
     const controls = make("p", { class: "controls travel" },
       make("button", { type: "button", id: "play" }, "Play"),
       make("label", { for: "travel" }, "Position along the path"),
       make("input", { type: "range", id: "travel", min: "0", max: String(last), step: "1", value: String(first) }),
       make("output", { id: "travelled", for: "travel" }),
-      ...(this.data.isTimed ? [make("label", {}, "whole path in: ", pace)] : []));
+      ...(this.data.isTimed ? [make("label", {}, "Speed: ", pace)] : []));
     byId("robot").after(controls);
   }
 
@@ -92,18 +92,19 @@ export class Schedule {
       button.addEventListener("click", () => this.choose(k === 1));
     });
     this.rows = data.settings.map((setting, k) => this.row(setting, k));
-    const heads = [...data.settings.map((each) => (each.unit ? `${each.name}, ${each.unit}` : each.name)), `${this.pointName()}${data.unit ? `, ${data.unit}` : ""}`];
+    const withUnit = (/** @type {string} */ name, /** @type {string} */ unit) => (unit ? `${name}, ${unit}` : name);
+    const heads = [...data.settings.map((each) => withUnit(each.name, each.unit)), `${withUnit(this.pointName(), data.unit)}, here`, withUnit(data.name, data.unit)];
     this.lines = ["schedule", "best constant", "shown, computed here"].map((words) => {
       const cells = heads.map(() => make("td", {}));
       return { cells, element: make("tr", {}, make("th", { scope: "row" }, words), ...cells) };
     });
     this.lines[1].element.hidden = !data.constant;
     const head = make("thead", {}, make("tr", {}, make("th", {}), ...heads.map((each) => make("th", { scope: "col" }, each))));
-    const table = make("table", { id: "at-point" }, make("caption", {}, "Values at this point of the path"), head, make("tbody", {}, ...this.lines.map((each) => each.element)));
+    const table = make("table", { id: "at-point" }, make("caption", {}, "This point, and the whole path"), head, make("tbody", {}, ...this.lines.map((each) => each.element)));
     const button = make("button", { type: "button", id: "copy-schedule" }, "Copy schedule");
     button.hidden = !data.table;
     button.addEventListener("click", async () => copy(new TextDecoder().decode(await unpack(data.table ?? "")), "Schedule, as --schedule writes it"));
-    const words = `${data.table ? "" : "The schedule is too large for a copy: solve --schedule FILE writes it. "}evaluate takes one robot. The case file below has the robot at this point.`;
+    const words = `The program computed the first ${data.constant ? "two rows" : "row"}. ${data.table ? "Copy schedule has the columns of --schedule" : "The schedule is too large for a copy: solve --schedule FILE writes it"}. No --set option states a point of the path; Copy case file has the robot at this point, for evaluate.`;
     const section = make("section", { id: "schedule" }, make("h2", {}, "Settings at this point"), make("div", { class: "controls" }, ...this.choices, button),
       ...this.rows.flatMap((each) => [each.element, each.note]), make("div", { class: "scroll" }, table), make("p", { class: "note" }, words));
     byId("mode-solve").parentElement?.before(section);
@@ -278,8 +279,8 @@ export class Schedule {
       say(note, words);
       note.classList.toggle("warning", isOut);
     });
-    const shown = (/** @type {number[]} */ row, /** @type {number} */ value) => [...row.map((each, k) => digits(each * data.settings[k].factor, 6)), digits(value, 7)];
-    const texts = [shown(data.rows[index], data.F[index]), data.constant ? shown(data.constant.row, data.constant.F[index]) : [], shown(now, this.value())];
+    const shown = (/** @type {number[]} */ row, /** @type {number} */ value, /** @type {string} */ whole) => [...row.map((each, k) => digits(each * data.settings[k].factor, 6)), digits(value, 7), whole];
+    const { constant } = data, texts = [shown(data.rows[index], data.F[index], digits(data.value)), constant ? shown(constant.row, constant.F[index], digits(constant.value)) : [], shown(now, this.value(), "")];
     this.lines?.forEach(({ cells }, k) => texts[k].forEach((text, i) => say(cells[i], text)));
     this.maps?.forEach((_, k) => this.paint(k));
   }
