@@ -14,7 +14,7 @@ import { unpack } from "./text.js";
  * @typedef {Told & { isFault: boolean, isProgram: boolean }} Headline
  * @typedef {{ settings: Setting[], rows: number[][], reach: [number, number][][], step: (number | null)[][], rates: (number | null)[][],
  *   F: number[], value: number, constant: { row: number[], design: number[], F: number[], value: number } | null, design: { places: number[], values: number[] },
- *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, isWorst: boolean, sign: number,
+ *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, hasSlopes: boolean, isWorst: boolean, sign: number,
  *   unit: string, isTimed: boolean, isAnswer: boolean, name: string, schedule: Told, held: Told | null, maps: MapData[],
  *   table: string | null }} ScheduleData rows, reach and step in units of computations; turn is that of a tool without a setting
  */
@@ -65,6 +65,8 @@ export class Schedule {
     this.moved = null;
     this.isCase = true;
     document.documentElement.classList.add("on-schedule");
+    // Slopes of the module are those of one task without its weight.
+    if (!data.hasSlopes) state.data.has_slopes = false;
     this.addTravel();
     this.addControls(copy);
     this.addMaps();
@@ -104,7 +106,7 @@ export class Schedule {
     const button = make("button", { type: "button", id: "copy-schedule" }, "Copy schedule");
     button.hidden = !data.table;
     button.addEventListener("click", async () => copy(new TextDecoder().decode(await unpack(data.table ?? "")), "Schedule, as --schedule writes it"));
-    const words = `The program computed the first ${data.constant ? "two rows" : "row"}. ${data.table ? "Copy schedule has the columns of --schedule" : "The schedule is too large for a copy: solve --schedule FILE writes it"}. No --set option states a point of the path; Copy case file has the robot at this point, for evaluate.`;
+    const words = `The program computed the first ${data.constant ? "two rows" : "row"}. ${data.table ? "Copy schedule has the columns of --schedule" : "The schedule is too large for a copy: solve --schedule FILE writes it"}. No --set option states a point of the path${this.state.data.case_parts.length ? "; Copy case file has the robot at this point, for evaluate" : ""}.`;
     const section = make("section", { id: "schedule" }, make("h2", {}, "Settings at this point"), make("div", { class: "controls" }, ...this.choices, button),
       ...this.rows.flatMap((each) => [each.element, each.note]), make("div", { class: "scroll" }, table), make("p", { class: "note" }, words));
     byId("mode-solve").parentElement?.before(section);
@@ -256,7 +258,9 @@ export class Schedule {
   headline() {
     const { state, data } = this, told = this.isConstant && data.held ? data.held : data.schedule;
     if (state.fault & 1 || state.kind === "none") return { value: this.pointName(), word: "no robot", words: "The robot has no configuration at these values.", isFault: true, isProgram: false };
-    if (this.isProgram()) return { ...told, isFault: !data.isAnswer, isProgram: data.isAnswer };
+    // Texts of the program get the minus signs of the page.
+    const proper = (/** @type {string} */ text) => text.replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
+    if (this.isProgram()) return { value: proper(told.value), word: told.word, words: proper(told.words), isFault: !data.isAnswer, isProgram: data.isAnswer };
     const own = this.own(this.index), { moved } = this;
     const names = data.settings.filter((_, k) => moved && moved[k] !== own[k]).map((each) => each.name);
     if (!this.isCase) names.push("dimensions");
