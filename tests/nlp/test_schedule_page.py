@@ -165,7 +165,8 @@ def test_a_point_of_a_schedule_goes_out_and_comes_back(opened: Callable[..., Any
     act(chrome, CLICK, "show-schedule")
     click = """
     const map = root.querySelector(".schedule-map"), box = map.getBoundingClientRect();
-    map.dispatchEvent(new MouseEvent("click", { clientX: box.left + 0.25 * box.width, clientY: box.top + 0.4 * box.height }));"""
+    const at = { clientX: box.left + 0.25 * box.width, clientY: box.top + 0.4 * box.height };
+    map.dispatchEvent(new MouseEvent("click", at));"""
     act(chrome, click)
     index = chrome.execute_script("return screwsynth.track.index")
     turn = chrome.execute_script("return screwsynth.track.schedule.values()[0]") / _DEGREE
