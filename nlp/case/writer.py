@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Parameter, Substitution, axis_from_screw, unit_vector
+from ...models.model import joint_parameter
 from ...models.posesettings import slope_name
 from ...models.statics import driven_joints
 from ..errors import CaseError
@@ -117,9 +118,9 @@ def _lines(case: Case) -> Iterator[str]:
         "[robot]", {"model": name, **options, "characteristic_length": length, **_stiffness(case.loading)}
     )
     parameters: dict[str, TomlValue] = {}
-    slopes = {slope_name(each.name) for each in model.settings}
+    further = {*(slope_name(each.name) for each in model.settings), *map(joint_parameter, model.locked)}
     for item in model.parameters:
-        if item.name in slopes:
+        if item.name in further:
             continue
         values, stated = case.components(item.name), _stated(case, item)
         numbers = [written_dimension(value, units, item.dimension) for value in stated]

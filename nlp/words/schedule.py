@@ -35,6 +35,10 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
         tone=Tone.ANSWER,
         after=f" {where} ({_gain(schedule)})",
     )
+    if case.model.locked:
+        joints = case.model.locked
+        who = f"actuated joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+        yield Line(f"F is taken with {who} locked at each point of the path", label="note")
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"

@@ -20,7 +20,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, instantiate
-from ....models.joints.model.closedform import closed_form
+from ....models.joints.model.closedform import closed_form, eliminated_form
 from ....models.rotation import matrix_from_axis_angle
 from ....models.statics import posed_statics
 from ....models.values import dataclass
@@ -38,12 +38,19 @@ from ...path.waypoints import Waypoints, waypoints
 from ...program.actuators import signed_values
 from ...program.layout import reference_of
 
+#: First words of the name of a limb's reach among the limits.
+REACH = "reach limb "
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
 #: Rounding of a difference of two settings, relative to the largest setting.
 _ROUNDING = 2.0**-50
+#: Largest residual of closed loops, which have magnitudes of about 1. At the edge of the reach it is as large as the
+#: excess over a limit that counts as rounding.
+_CLOSED = 1e-6
+#: Number of designs and settings at which loops are tested along the path.
+_TESTED, _SEED = 12, 0
 
 
 class Variable(NamedTuple):
@@ -89,6 +96,7 @@ class ScheduleProblem:
         objective: (T, 1) signed objectives.
         limits: (c, 1) limits as expressions that must be at most 0.
         of_design: (b, 1) limits of the design alone, at most 0.
+        loops: (e, 1) left sides of the loop equations, scaled to values of about 1; 0 at poses that the robot can take.
         names: names of the limits.
         margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
     """
@@ -102,6 +110,7 @@ class ScheduleProblem:
     objective: SX
     limits: SX
     of_design: SX
+    loops: SX
     names: tuple[str, ...]
     margins: FloatArray | None = None
 
@@ -156,6 +165,14 @@ class ScheduleProblem:
         objective, limits = self.function.map(count)(design, np.reshape(s, (count, -1)).T, numbers)
         return Values(objective.full().T, limits.full().T)
 
+    def gaps(self, d: FloatArray, s: FloatArray) -> FloatArray:
+        """Return the largest residual (N,) of the loop equations at the points, for a design (n,) and settings."""
+        function = ca.Function("loops", list(self.symbols), [ca.densify(self.loops)])
+        count = len(self.points)
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        found = function.map(count)(design, np.reshape(s, (count, -1)).T, self.numbers)
+        return np.abs(found.full()).max(axis=0, initial=0.0)
+
     def combined(self, objective: FloatArray) -> FloatArray:
         """Return the value of each point from its objectives (..., T): their sum, or the worst."""
         weighted = objective * self.weights
@@ -179,6 +196,7 @@ class ScheduleProblem:
         return bool(
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
+            and (self.gaps(d, s) <= _CLOSED).all()
             and (own <= slack).all()
             and (s >= low - rounding).all()
             and (s <= high + rounding).all()
@@ -209,11 +227,12 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
+    if closed.model.unknowns:
+        closed = eliminated_form(case.model)
     model = closed.model
     if model.unknowns:
-        fault = (
-            f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
-        )
+        names = ", ".join(each.description or each.name for each in model.unknowns)
+        fault = f"is not supported along a path for {case.model.name!r}: no closed form of {names}"
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
@@ -236,13 +255,14 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     ]
     for reach in closed.reaches:
         value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
-        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf, NUMBER))
+        stated.append((f"{REACH}{reach.limb}", value, 0.0, math.inf, NUMBER))
     rows = [row for each in stated for row in _rows(*each, case.characteristic_length)]
+    rows = [row for row in rows if not _is_bound(row[1], d, s, [*design, *settings])]
     varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
     values = _values(case, model, robot)
     weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
-    return ScheduleProblem(
+    problem = ScheduleProblem(
         case=case,
         points=points,
         design=design,
@@ -252,8 +272,36 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         objective=case.tasks[0].sense.sign * values,
         limits=ca.vertcat(SX(0, 1), *[row + point[15] for _, row in at_points]),
         of_design=ca.vertcat(SX(0, 1), *[row for (_, row), own in zip(rows, varying, strict=True) if not own]),
+        loops=robot.loops if model.loops else robot.closure,
         names=tuple(name for name, _ in at_points),
     )
+    _check_poses(problem)
+    return problem
+
+
+def _check_poses(problem: ScheduleProblem) -> None:
+    """Refuse a path with a pose that the robot takes with no tested design and settings within its reach.
+
+    Raises:
+        CaseError: the loop equations exclude a pose.
+    """
+    count, (low, high, first) = len(problem.points), ends([*problem.design, *problem.settings])
+    if not problem.loops.numel():
+        return
+    rng, n = np.random.default_rng(_SEED), len(problem.design)
+    reach = [k for k, name in enumerate(problem.names) if name.startswith(REACH)]
+    least, within = np.full(count, math.inf), np.zeros(count, dtype=bool)
+    for values in (first, *(rng.uniform(low, high) for _ in range(_TESTED))):
+        d, s = values[:n], np.repeat(values[None, n:], count, axis=0)
+        is_within = (problem.at(d, s).excess[:, reach] <= 0).all(axis=1)
+        least[is_within] = np.minimum(least, problem.gaps(d, s))[is_within]
+        within |= is_within
+    wrong = np.flatnonzero(within & ~(least <= _CLOSED))
+    if len(wrong):
+        x, y, z = problem.points.positions[wrong[0]].tolist()
+        fault = f"{problem.case.model.name!r} cannot take the pose at ({x:.7g}, {y:.7g}, {z:.7g}): its joints constrain"
+        raise CaseError("path.file", f"{fault} the platform to other poses", source=problem.case.source)
+
 
 
 def _check_times(case: Case, points: Waypoints) -> None:
@@ -353,3 +401,23 @@ def _rows(
         yield name, (expression - upper) / reading.size(upper, length)
     if math.isfinite(lower):
         yield name, (lower - expression) / reading.size(lower, length)
+
+
+def _is_bound(row: SX, d: SX, s: SX, variables: Sequence[Variable]) -> bool:
+    """Return whether a row ``row <= 0`` holds within the range of its only variable, as the limit on a joint does.
+
+    Args:
+        row: (1, 1) row.
+        d, s: symbols of design and settings.
+        variables: variables of both.
+    """
+    symbols = ca.vertcat(d, s)
+    own = ca.symvar(row)
+    hashes = [each.element_hash() for each in ca.vertsplit(symbols)] if symbols.numel() else []
+    if len(own) != 1 or own[0].element_hash() not in hashes:
+        return False
+    variable = variables[hashes.index(own[0].element_hash())]
+    if ca.depends_on(ca.jacobian(row, own[0]), own[0]):
+        return False
+    ends_of_row = ca.Function("row", own, [row]).map(2)([variable.lower, variable.upper]).full()
+    return bool((ends_of_row <= _ROUNDING).all())
