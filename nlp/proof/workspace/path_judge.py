@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import casadi as ca
 
+from ....models.model import joint_parameter
 from ...case.case import Case
 from ...case.checks import check_determined_joints
 from ...case.limits.joints import JointAngle, MountingPose
@@ -78,7 +79,8 @@ def check_changing(case: Case, names: Sequence[str], *, sampling: Sampling | Non
             fault = "is free, and a path is judged with fixed dimensions: give it with --set, or a result with --of"
             raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
     first = case.parameter_name(names[0])
-    if not has_straight_legs(case.model):
+    joints = [joint_parameter(label) for label in case.model.locked]
+    if not (has_straight_legs(case.model) or all(name in joints for name in names)):
         fault = f"{case.model.name} is not a robot with six straight legs, for which alone this is proved"
         raise CaseError(f"robot.parameters.{first}.per", f"{fault}; give the drive as a joint", "path", case.source)
     for limit in case.limits:
