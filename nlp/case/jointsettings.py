@@ -50,7 +50,10 @@ def with_joints_along(model: Model, parameters: Mapping[str, Any], limits: Limit
     for label in labels:
         name = joint_parameter(label)
         given = found.get(name)
-        (value,) = given if isinstance(given, Sequence) else (given,)
+        (value,) = given if isinstance(given, Sequence) and len(given) == 1 else (given,)
+        if isinstance(value, Free) and name in parameters and model.free_joints:
+            fault = "must be a number, at which the joint is locked; state a range in limits.joint"
+            raise CaseError(f"robot.parameters.{name}", fault)
         if value is None or isinstance(value, Free):
             named = [each for each in motions if any(joint.label == label for joint in each.joints(model))]
             found[name] = _range(label, named)

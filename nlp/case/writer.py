@@ -120,7 +120,7 @@ def _lines(case: Case) -> Iterator[str]:
     parameters: dict[str, TomlValue] = {}
     further = {*(slope_name(each.name) for each in model.settings), *map(joint_parameter, model.locked)}
     for item in model.parameters:
-        if item.name in further:
+        if item.name in further and not _is_locked(case, item):
             continue
         values, stated = case.components(item.name), _stated(case, item)
         numbers = [written_dimension(value, units, item.dimension) for value in stated]
@@ -151,6 +151,12 @@ def _lines(case: Case) -> Iterator[str]:
     for row in case.published:
         value = row.value[0] if len(row.value) == 1 else row.value
         yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
+
+
+def _is_locked(case: Case, item: Parameter) -> bool:
+    """Return whether a parameter is the coordinate of a joint that is locked at a stated value."""
+    is_joint = item.name in map(joint_parameter, case.model.locked)
+    return is_joint and not any(isinstance(each, Free) for each in case.components(item.name))
 
 
 def _stated(case: Case, item: Parameter) -> list[Value | PerTask | PerPose]:

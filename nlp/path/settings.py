@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.model import joint_parameter
 from ..case.pathfile import TURN
 from ..case.pose import Free
 from ..case.task import LEG_LENGTH, Task
@@ -84,6 +85,7 @@ class Changing:
         own: name of each dimension in the robot, by name of its column.
         dimensions: dimension of each setting.
         fixed: names of columns of quantities that the case fixes.
+        joints: names of the columns of actuated joints.
     """
 
     axis: FloatArray | None
@@ -92,6 +94,7 @@ class Changing:
     own: Mapping[str, str]
     dimensions: Mapping[str, Dimension]
     fixed: tuple[str, ...]
+    joints: tuple[str, ...] = ()
 
     @property
     def unread(self) -> Changing:
@@ -216,8 +219,9 @@ def changing_of(case: Case) -> Changing:
             else:
                 fixed.append(column)
     tool = None if case.path is None else case.path.tool
+    joints = tuple(map(joint_parameter, case.model.locked))
     if tool is None:
-        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed))
+        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed), joints)
     if TURN in ranges:
         dimensions[TURN] = Dimension.ANGLE
     else:
@@ -226,4 +230,4 @@ def changing_of(case: Case) -> Changing:
     axis = np.array(tool.axis, dtype=np.float64)
     # Division by the largest component first: squares neither overflow nor vanish.
     axis = axis / np.abs(axis).max()
-    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed))
+    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed), joints)

@@ -54,6 +54,7 @@ class Schedule:
         seconds: wall time.
         judgement: verdicts on ranks and limits along the whole path; None without limits over the path.
         added: number of points that were added because limits were violated there.
+        is_home_mode: If true, the bound is one of the home working mode; a robot without loops has no other mode.
     """
 
     names: tuple[str, ...]
@@ -73,6 +74,7 @@ class Schedule:
     seconds: float
     judgement: Judgement | None = None
     added: int = 0
+    is_home_mode: bool = False
 
     @property
     def gain(self) -> float | None:
@@ -99,10 +101,11 @@ class Schedule:
             return ""
         stated = ", ".join(f"{name} = {value:.7g}" for name, value in self.design.items())
         what = f"the design with {stated}" if stated else "this robot"
+        mode = "in the home working mode " if self.is_home_mode else ""
         side = "more" if self.sign > 0 else "less"
         rounded = Context(7, ROUND_CEILING if self.sign > 0 else ROUND_FLOOR).create_decimal_from_float(self.bound)
         return (
-            f"no schedule of {what} within the limits and rates has {side} than {float(rounded):.7g} "
+            f"no schedule of {what} {mode}within the limits and rates has {side} than {float(rounded):.7g} "
             "at the points of the path"
         )
 

@@ -185,6 +185,7 @@ def _solution(
         seconds=seconds,
         judgement=None if proved is None else proved.judgement,
         added=0 if proved is None else proved.added,
+        is_home_mode=bool(case.model.unknowns),
     )
     return replace(found, schedule=schedule)
 
