@@ -168,6 +168,11 @@ class Model(Whole, Shown):
         """Labels of the actuated joints with free actuator coordinates."""
         return tuple(each.joint for each in self.unknowns if each.is_free)
 
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Labels of the actuated joints that the pose does not determine: unknowns, or parameters for a path."""
+        return (*self.locked, *self.free_joints)
+
     def with_joints_as_parameters(self) -> Model:
         """Return the robot with its free actuator coordinates as parameters, which are 0 at home.
 

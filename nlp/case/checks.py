@@ -55,7 +55,12 @@ def check_value(
     start = value.start
     if start is not None:
         start = _check_number(start, f"{key}.start", dimension, units, (lower, upper))
-    return Free(lower, upper, start, rate=None if value.rate is None else check_rate(value.rate, f"{key}.rate", dimension, units))
+    return Free(
+        lower,
+        upper,
+        start,
+        rate=None if value.rate is None else check_rate(value.rate, f"{key}.rate", dimension, units),
+    )
 
 
 def check_rate(rate: float, key: str, dimension: Dimension, units: Units) -> float:

@@ -38,16 +38,15 @@ def with_joints_along(model: Model, parameters: Mapping[str, Any], limits: Limit
     Raises:
         CaseError: a limit on a joint is not allowed, or a free joint has no range.
     """
-    if not (model.free_joints or model.locked):
+    if not model.undetermined:
         return JointsAlong(model, parameters)
     from .limits.joint_motion import JointMotion  # noqa: PLC0415 - most cases start without the tables of limits
 
     motions = [each for each in limits if isinstance(each, JointMotion)]
     for each in motions:
         each.check(LimitedCase(model, units, {}, NO_LOADING))
-    labels = (*model.locked, *model.free_joints)
     found = dict(parameters)
-    for label in labels:
+    for label in model.undetermined:
         name = joint_parameter(label)
         given = found.get(name)
         (value,) = given if isinstance(given, Sequence) and len(given) == 1 else (given,)

@@ -273,9 +273,7 @@ class _Path:
         larger = np.where(np.isin(np.arange(len(self._home)), (3, 4, 5)), factor, 1.0)
         # Points given by dimensions alone close the loops of home at any size, so residuals away from home count too.
         away = self._home + _AWAY * self.scale * np.random.default_rng(_SEED).uniform(-1, 1, len(self._home))
-        change = [
-            self._kernel(larger * z, typical)[0] - self._kernel(z, self._typical)[0] for z in (self._home, away)
-        ]
+        change = [self._kernel(larger * z, typical)[0] - self._kernel(z, self._typical)[0] for z in (self._home, away)]
         return factor if float(np.abs(np.concatenate(change)).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:

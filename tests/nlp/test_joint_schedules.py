@@ -90,7 +90,7 @@ file = "path.csv"
 """
 
 
-MOVING = f"{{ min = {-RAIL}, max = {RAIL}, per = \"path\", rate = {RATE} }}"
+MOVING = f'{{ min = {-RAIL}, max = {RAIL}, per = "path", rate = {RATE} }}'
 
 
 def circle(folder: Path, count: int = 40, radius: float = 0.25, turns: float = 1.0) -> None:
@@ -118,7 +118,7 @@ def elbow(limb: int, rail: Array, position: Array) -> tuple[Array, Array, Array]
 
 
 def work(limb: int, rail: Array, position: Array, feed: Array) -> Array:
-    """Return the squared work rate (...) of a rod of unit force: its change of length while rail and crank are locked."""
+    """Return the squared work rate (...) of a rod of unit force: its change of length with locked rail and crank."""
     _, at, end = elbow(limb, rail, position)
     step = 1e-6
     lengths = [np.linalg.norm(end + sign * step * feed - at, axis=-1) for sign in (1, -1)]
@@ -260,7 +260,7 @@ def test_three_rails_move_as_each_one_alone(tmp_path: Path) -> None:
 def test_a_joint_without_a_rate_is_the_same_everywhere(tmp_path: Path) -> None:
     circle(tmp_path, 12)
     limits = f'"1:1" = {MOVING}\n"2:1" = {{ min = {-RAIL}, max = {RAIL} }}'
-    text = case_text(limits).replace("[limits.joint]", '[solve]\nstarts = 2\n[limits.joint]')
+    text = case_text(limits).replace("[limits.joint]", "[solve]\nstarts = 2\n[limits.joint]")
     schedule = solve(load_case(planar(tmp_path, text, 2))).schedule
     assert schedule is not None
     assert schedule.names == ("joint.1:1",)
@@ -285,11 +285,11 @@ def test_a_rail_that_stays_at_its_end_gains_nothing(tmp_path: Path, over: str) -
 
 
 def test_the_base_of_a_leg_follows_the_platform(tmp_path: Path, cli: Run) -> None:
-    """With any rate, the base of a leg stays where the leg is steepest: below its joint on the platform, in its rail."""
+    """With any rate, the base of a leg stays where the leg is steepest: below its joint on the platform."""
     saved(tmp_path / "robot.toml", LEGS)
     saved(tmp_path / "path.csv", "t,x,y,z\n0,-5,0,20\n2,5,0,20\n")
     limits = '"1:1" = { min = -25, max = -5, per = "path", rate = RATE }'
-    text = case_text(limits, task='axis = [0, 0, 1]\npitch = inf').replace('length = "m"', 'length = "in"')
+    text = case_text(limits, task="axis = [0, 0, 1]\npitch = inf").replace('length = "m"', 'length = "in"')
     locked = '"robot.toml", parameters = { r = 26.5, "joint.2:1" = 0, "joint.3:1" = -1.5 }'
     text = text.replace('"robot.toml"', locked).replace("[limits.joint]", '[limits]\nover = "path"\n[limits.joint]')
     for rate, gain in (("inf", True), ("0.5", False)):
@@ -390,10 +390,12 @@ def test_idle_passive_joints_are_no_settings(tmp_path: Path) -> None:
     """A rod between ball joints spins about itself; only the driven rail below it is a setting."""
     model = robot_function("6-pus")()
     assert model.free_joints == model.with_joints_as_parameters().locked == ()
-    saved(tmp_path / "robot.toml", LEGS.replace('{ type = "U", at = "B", axes = ["x", "y"] }', '{ type = "S", at = "B" }'))
+    saved(
+        tmp_path / "robot.toml", LEGS.replace('{ type = "U", at = "B", axes = ["x", "y"] }', '{ type = "S", at = "B" }')
+    )
     saved(tmp_path / "path.csv", "t,x,y,z\n0,-5,0,20\n2,5,0,20\n")
     limits = "\n".join(f'"{k}:1" = {{ min = -20, max = 0, per = "path", rate = 1 }}' for k in (1, 2, 3))
-    text = case_text(limits, task='axis = [0, 0, 1]\npitch = inf').replace('length = "m"', 'length = "in"')
+    text = case_text(limits, task="axis = [0, 0, 1]\npitch = inf").replace('length = "m"', 'length = "in"')
     text = text.replace('"robot.toml"', '"robot.toml", parameters = { r = 26.5 }')
     case = load_case(str(saved(tmp_path / "case.toml", text)))
     assert list(case.settings) == ["joint.1:1", "joint.2:1", "joint.3:1"]

@@ -73,7 +73,6 @@ class JointTable(IntervalTable):
         default=None, description="axis of the cone, in the home configuration; the direction of the link if left out"
     )
 
-
     @model_validator(mode="after")
     def _refuse_rate_alone(self) -> JointTable:
         """Refuse a change along the path without range or rate, and a rate without a change along the path."""
@@ -262,7 +261,7 @@ class JointMotion(LimitOnJoint):
         check_rate(self.rate, f"{key}.rate", self.ranges(model)["max"].dimension, case.units)
         if self.min is None or self.max is None:
             raise CaseError(f"{key}.per", "needs min and max of the joint", "path")
-        free = (*model.locked, *model.free_joints)
+        free = model.undetermined
         driven = [each.joint for each in model.actuators]
         for joint in self.joints(model):
             if joint.label not in free:

@@ -303,7 +303,6 @@ def _check_poses(problem: ScheduleProblem) -> None:
         raise CaseError("path.file", f"{fault} the platform to other poses", source=problem.case.source)
 
 
-
 def _check_times(case: Case, points: Waypoints) -> None:
     """Refuse a finite rate along a path with a segment without a time."""
     limited = [name for name, value in case.settings.items() if value.rate is not None and math.isfinite(value.rate)]
@@ -408,7 +407,8 @@ def _is_bound(row: SX, d: SX, s: SX, variables: Sequence[Variable]) -> bool:
 
     Args:
         row: (1, 1) row.
-        d, s: symbols of design and settings.
+        d: (n, 1) symbols of the design.
+        s: (k, 1) symbols of the settings.
         variables: variables of both.
     """
     symbols = ca.vertcat(d, s)
