@@ -16,7 +16,7 @@ from ...models import Dimension, FloatArray
 from ...models.model import joint_parameter
 from ..case.pathfile import TURN
 from ..case.pose import Free
-from ..case.task import LEG_LENGTH, Task
+from ..case.task import ALONG, Task
 from ..errors import InputError
 from ..units import Units
 
@@ -195,7 +195,7 @@ def case_along(case: Case, settings: Settings) -> Case:
                 low, high = float(own.min()), float(own.max())
                 values[k] = Free(low, high) if low < high else low
         parameters[item.name] = values if len(values) > 1 else values[0]
-    stated = tuple(task for task in case.tasks if not (task.follows or task.measure == LEG_LENGTH))
+    stated = tuple(task for task in case.tasks if not (task.follows or task.measure in ALONG))
     tasks = stated or (replace(Task.translation((0.0, 0.0, 1.0)), is_stated=False),)
     return replace(case, parameters=parameters, tasks=tasks, over_path=None, path=None)
 

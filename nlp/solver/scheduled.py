@@ -50,6 +50,8 @@ class Schedule:
         rates: (k,) largest rates of the case, per second; infinite for no limit.
         design: values of the free dimensions of the design, by name.
         bound: proved bound of the objective of all schedules of this design; None without a proof.
+        reason: reason why the gap of the bound was not reached, such as a time limit; empty if it was, or without a
+            request.
         sign: 1 for a maximum, -1 for a minimum.
         seconds: wall time.
         judgement: verdicts on ranks and limits along the whole path; None without limits over the path.
@@ -75,6 +77,7 @@ class Schedule:
     judgement: Judgement | None = None
     added: int = 0
     is_home_mode: bool = False
+    reason: str = ""
 
     @property
     def gain(self) -> float | None:
