@@ -26,10 +26,17 @@ _DIGITS = 17
 
 
 class ConstantSetting(NamedTuple):
-    """Best settings that are the same at all points: values (k,) in the case's units, and the objective."""
+    """Best settings that are the same at all points.
+
+    Attributes:
+        values: (k,) values in the case's units.
+        value: objective.
+        design: values of the free dimensions of their design, by name.
+    """
 
     values: FloatArray
     value: float
+    design: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +50,7 @@ class Schedule:
         values: (N, k) values at the points; linear between them.
         times: (N,) times of the points, seconds; NaN without stated times.
         poses: poses of the path at the points, without a turn about the tool.
+        feeds: (N, 3) unit vectors of the feed at the points; 0 where the platform only rotates or rests.
         F: (N,) objective of each point: the sum over the tasks, or the worst value.
         over: combination of F over the points.
         value: objective: the weighted mean, or the worst value.
@@ -65,6 +73,7 @@ class Schedule:
     values: FloatArray
     times: FloatArray
     poses: Poses
+    feeds: FloatArray
     F: FloatArray
     over: OverPoses
     value: float
@@ -98,6 +107,11 @@ class Schedule:
         return np.asarray(np.abs(np.diff(self.values, axis=0) / np.diff(self.times)[:, None]).max(axis=0))
 
     @property
+    def quaternions(self) -> FloatArray:
+        """Unit quaternions (N, 4) of the poses, real part first, each near the one before."""
+        return _quaternions(self.poses.rotations)
+
+    @property
     def statement(self) -> str:
         """Bound in words; empty without a proof."""
         if self.bound is None:
@@ -116,7 +130,7 @@ class Schedule:
         """Return the schedule as a table of poses, with a column for each setting, and ``t`` if times are stated."""
         columns = {
             **dict(zip("xyz", self.poses.positions.T, strict=True)),
-            **dict(zip(("qw", "qx", "qy", "qz"), _quaternions(self.poses.rotations).T, strict=True)),
+            **dict(zip(("qw", "qx", "qy", "qz"), self.quaternions.T, strict=True)),
             **dict(zip(self.names, self.values.T, strict=True)),
         }
         if np.isfinite(self.times).all():
