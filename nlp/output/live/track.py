@@ -109,6 +109,7 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
             "unit": panel.unit,
             "limits": list(panel.limits),
             "is_speed": panel.is_speed,
+            "is_lower": panel.is_lower,
             **_scale(panel),
             "curves": [
                 {

@@ -71,6 +71,7 @@ class PathPanel(NamedTuple):
         is_cut: True if very large values are omitted.
         is_coordinate: True for coordinates of actuators, False for their forces and speeds.
         is_speed: True for speeds, which only segments with a time have.
+        is_lower: True if the only limit is a lower one.
     """
 
     title: str
@@ -80,6 +81,7 @@ class PathPanel(NamedTuple):
     is_cut: bool = False
     is_coordinate: bool = False
     is_speed: bool = False
+    is_lower: bool = False
 
     @property
     def label(self) -> str:
@@ -223,10 +225,12 @@ def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]
         factor = judged.case.units.shown(1.0, dimension)
         curves = [PathCurve(drives[k].name, k, factor * joints.coordinates[:, k]) for k in own]
         names = {f"{measure} limb {drives[k].name}" for k in own}
-        limits = {each.limit for each in judged.extremes if each.name in names and each.limit is not None}
+        limited = [each for each in judged.extremes if each.name in names and each.limit is not None]
+        limits = {each.limit for each in limited if each.limit is not None}
+        is_lower = bool(limited) and all(each.sense is Sense.MIN for each in limited)
         words = {"leg_length": "leg lengths", "actuator_angle": "actuator angles"}.get(measure, "actuator lengths")
         ends, unit = tuple(sorted(factor * each for each in limits)), judged.case.units.label(dimension)
-        yield PathPanel(words, unit, tuple(curves), ends, is_coordinate=True)
+        yield PathPanel(words, unit, tuple(curves), ends, is_coordinate=True, is_lower=is_lower)
 
 
 def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:

@@ -7,7 +7,7 @@ import { byId, make } from "./panel.js";
  * @typedef {import("./numbers.js").Vector} Vector
  * @typedef {import("./scene.js").Piece} Piece
  * @typedef {{ words: string, at: number, values: number[], has_time: boolean }} Frame point of the path, with the variables of the pose
- * @typedef {{ title: string, unit: string, limits: number[], low: number, high: number, base: number, is_speed: boolean, curves: { name: string, values: (number | null)[] }[] }} Panel
+ * @typedef {{ title: string, unit: string, limits: number[], low: number, high: number, base: number, is_speed: boolean, is_lower: boolean, curves: { name: string, values: (number | null)[] }[] }} Panel
  * @typedef {{ places: number[], frames: Frame[], panels: Panel[], path: Vector[], nearest: number[], margins: (number | null)[],
  *   limits: { words: string, colour: string }[], most: number, marks: { words: string, position: Vector }[], first: number }} TrackData
  */
@@ -151,7 +151,7 @@ export class Track {
         const base = partOf(panel, panel.base), part = now === null ? base : partOf(panel, now);
         fill.style.left = `${Math.min(base, part).toFixed(2)}%`;
         fill.style.width = `${Math.abs(part - base).toFixed(2)}%`;
-        const isOver = now !== null && panel.limits.length > 0 && (now > high || (panel.limits.length > 1 && now < low));
+        const isOver = now !== null && panel.limits.length > 0 && ((now > high && !panel.is_lower) || ((panel.limits.length > 1 || panel.is_lower) && now < low));
         element.classList.toggle("over", isOver);
       }
     }
