@@ -78,16 +78,12 @@ def path_premises(target: str | None, case: Case, along: str | None, choices: Pa
     Raises:
         InputError: the file cannot be read, or is too long for a proof file.
     """
-    from ..errors import InputError
     from ..path.reader import text_of_path
-    from ..path.settings import dimensions_along
     from ..proof.checker.workspace.path_premises import premises_of
 
     stated = case.path if along is None else None
     if target is None or (along is None and stated is None):
         return None
-    if moving := dimensions_along(case):
-        raise InputError(f"--proof: proof files do not support {moving[0]}, a dimension that changes along the path")
     file, name = (along, along) if stated is None else (stated.file, stated.name)
     return premises_of(case, file or "", text_of_path(name or ""), choices, of_case=stated is not None)
 

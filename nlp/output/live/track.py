@@ -45,7 +45,9 @@ def live_path_page(
 
 
 def _live_view(picture: PathPicture, view: PathView, name: str) -> LiveView:
-    """Return the live view along a path; without C for the case, no view."""
+    """Return the live view along a path; no view without C for the case, or if dimensions change along the path."""
+    if picture.judged.path.settings.names:
+        return NO_LIVE_VIEW
     try:
         source = view_source(_case_along(picture, view))
         parts = live_parts(source, None, name, _track(picture, view, source))

@@ -138,7 +138,11 @@ def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Mar
         tag("figcaption", _legend(picture, data["marks"] != []), id="view-words"),
     )
     note = "The view needs JavaScript; all curves and tables are complete without it."
-    return join_markup([_controls(view), *coloured, figure, tag("noscript", tag("p", note))])
+    case, moving = picture.judged.case, picture.judged.path.settings.names
+    names = " and ".join(map(case.parameter_name, moving))
+    reasons = [f"The view has recorded postures, because the live view does not move {names} along a path."]
+    recorded = paragraphs(reasons if moving else [])
+    return join_markup([_controls(view), *coloured, figure, recorded, tag("noscript", tag("p", note))])
 
 
 def _legend(picture: PathPicture, has_marks: bool) -> Markup:
@@ -192,12 +196,13 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     at = picture.at[shown].tolist()
     count = len(ACTUATOR_COLOURS)
     names, strips = actuator_names(picture), dict[int, list[Curve]]()
+    names = {each.place: "" for each in panel.curves} if panel.is_setting else names
     for each in panel.curves:
         kind = f"curve a{each.place % count}{' other' * each.is_other}"
         strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
     ends = f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else ": no known value"
-    named = [Strip(f"actuator {names[place]}", curves) for place, curves in strips.items()]
+    named = [Strip(f"actuator {names[place]}".strip(), curves) for place, curves in strips.items()]
     return _chart(picture, named, f"{panel.title}{ends}", panel.unit, panel.limits)
 
 

@@ -25,7 +25,7 @@ from ....errors import InputError, UncoveredError
 from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.fixed_robot import Legs, check_leg_error, workspace_of_case
+from ...statement.fixed_robot import Legs, check_leg_error, legs_of, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
@@ -459,10 +459,10 @@ class _PathChecker(_Checker):
         premises = proof.premises
         if not isinstance(premises, PathPremises):
             raise ProofError("the proof is not about a tool path")
+        refuse_other_robot(case, legs_of(case), premises)
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
-        refuse_other_robot(case, robot.legs, premises)
         self._is_timed = path.is_timed
         self._begin(proof, case, root, robot, root.workspace)
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)

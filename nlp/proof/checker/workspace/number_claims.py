@@ -33,6 +33,7 @@ from ....errors import UncoveredError
 from ...statement.fixed_robot import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
+from ..proof_file import ProofError
 from .closed_loops import Enclosed
 from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
 from .loop_claims import LoopClaim, PosedLoops
@@ -275,6 +276,8 @@ class ClearanceClaim:
     def __init__(self, robot: PosedRobot, pair: Sequence[int], least: float) -> None:
         self.free, self._least = robot.free, least
         (foot, arm), (other_foot, other_arm) = (robot.legs[k] for k in pair)
+        if not (foot - other_foot).is_constant():
+            raise ProofError("leg clearances cannot be proved while a dimension changes along the path")
         self._feet = np.array(ca.DM(foot - other_foot)).ravel()
         # Vectors between the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
         spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
