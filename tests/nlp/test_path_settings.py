@@ -465,9 +465,11 @@ def test_a_proof_takes_no_setting_from_its_file() -> None:
 def test_a_claim_about_a_clearance_is_rejected_while_a_dimension_changes() -> None:
     case = moving(limits={"leg_clearance": {"min": 0.5}})
     proof, path = proof_along(case, written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS))
-    name, sense = next((each.name, each.sense) for each in proof.unproved if each.name.startswith("leg_clearance"))
-    forged = replace(next(each for each in proof.claims if each.reason == "boxes"), name=name, sense=sense, bound=0.5)
-    left = tuple(each for each in proof.unproved if each.name != name)
+    name = "leg_clearance limbs 1+ and 2-"
+    (own,) = [each for each in proof.unproved if each.name == name]
+    some = next(each for each in proof.claims if each.reason == "boxes")
+    forged = replace(some, name=name, sense=own.sense, bound=0.5)
+    left = tuple(each for each in proof.unproved if each is not own)
     with pytest.raises(ProofError, match="leg clearances cannot be proved"):
         check_path_proof(replace(proof, claims=(*proof.claims, forged), unproved=left), case, path)
 

@@ -289,16 +289,20 @@ class ClearanceClaim:
         matrix = self._forms(lower[:, self.free], upper[:, self.free]).forms().matrix(_ENDS, (3, 4))
         gaps = matrix.M[:, :, :3] / matrix.M[:, :, 3:]
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
-        size = np.sqrt((n * n).sum(axis=1))
-        needed = max(self._least, 0.0) * size * UP
+        distance, largest = np.sqrt((n * n).sum(axis=1)), np.abs(n).max(axis=1)
+        # Any vector but zero is valid. Its largest component becomes 1, so that its size does not underflow.
+        is_vector = largest > 0
+        n = n / np.where(is_vector, largest, 1.0)[:, None]
+        needed = max(self._least, 0.0) * np.sqrt((n * n).sum(axis=1)) * UP
         along = (n * self._feet).sum(axis=1)
         holds = along - needed >= PRODUCT * (np.abs(n) @ np.abs(self._feet) + needed)
+        holds &= is_vector | (self._least <= 0)
         factors = np.column_stack([n, -needed])[:, :, None]
         slopes, rest = np.abs(matrix.A @ factors[:, None])[..., 0], (matrix.rest @ np.abs(factors))[..., 0]
         fine = (matrix.M @ factors)[..., 0] >= (slopes.sum(axis=1) + rest) * UP
         shares = np.where(fine[:, None], 0.0, slopes).sum(axis=2)
         # The distance of the legs is at most that of any two of their points.
-        return Attempt(holds & fine.all(axis=1), shares, np.asarray(size < self._least * (1 - _WRONG)))
+        return Attempt(holds & fine.all(axis=1), shares, np.asarray(distance < self._least * (1 - _WRONG)))
 
 
 def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:

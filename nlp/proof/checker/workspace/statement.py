@@ -161,10 +161,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         else:
             return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
     if workspace.dependent or workspace.position_set is not None:
-        symbols = tolerance_layout(
-            case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
-        )
-        return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
+        return followed_claims(case, workspace)
     layout = posed_layout(case, workspace)
     place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
@@ -173,6 +170,15 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         return RobotClaims(legs, closed_layout(case, closed, workspace), closed.model, place, every, numbers_at)
     numbers_at = "every assembly mode" if is_open else ""
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
+
+
+def followed_claims(case: Case, workspace: Workspace) -> RobotClaims:
+    """Return the nominal robot of a case with fixed dimensions, with its loops followed from the workspace centre."""
+    closed = closed_form(case.model)
+    symbols = tolerance_layout(
+        case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
+    )
+    return _followed(legs_of(case), closed.model, workspace, symbols, is_open=bool(case.model.unknowns))
 
 
 def case_along_path(case: Case, path: ProgrammedPath) -> Case:
