@@ -66,6 +66,14 @@ class Settings:
     names: tuple[str, ...] = ()
     values: FloatArray | None = None
 
+    def by_name(self, segments: NDArray[np.intp], s: FloatArray) -> dict[str, FloatArray]:
+        """Return the values (k,) of each dimension at parameters (k,) of segments (k,)."""
+        return dict(zip(self.names, self.at(segments, s).T, strict=True))
+
+    def changes(self, segments: NDArray[np.intp]) -> FloatArray:
+        """Return the changes (k, d) of the values over whole segments (k,)."""
+        return np.zeros((len(segments), 0)) if self.values is None else np.diff(self.values, axis=0)[segments]
+
     def at(self, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
         """Return the values (k, d) at parameters (k,) of segments (k,)."""
         if self.values is None:
@@ -202,11 +210,6 @@ def case_along(case: Case, settings: Settings) -> Case:
 
 #: No tool, and no quantity that changes.
 UNCHANGED = Changing(None, 0.0, {}, {}, {}, ())
-
-
-def dimensions_along(case: Case) -> list[str]:
-    """Return the names of the dimensions of a case that change along its path."""
-    return [name for name in case.settings if name != TURN]
 
 
 def changing_of(case: Case) -> Changing:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.rotation import quaternion_from_matrix
 from ...models.values import dataclass
 from ..case.pose import OverPoses
 from ..path.path import Poses
@@ -144,17 +145,7 @@ class Schedule:
 
 def _quaternions(rotations: FloatArray) -> FloatArray:
     """Return unit quaternions (N, 4) of rotation matrices (N, 3, 3), each near the one before."""
-    found = np.empty((len(rotations), 4))
-    for k, R in enumerate(rotations):
-        K = np.array(
-            [
-                [R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-                [R[2, 1] - R[1, 2], R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-                [R[0, 2] - R[2, 0], R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
-                [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1]],
-            ]
-        )
-        q = np.linalg.eigh(K)[1][:, -1]
-        before = found[k - 1] if k else np.array([1.0, 0.0, 0.0, 0.0])
-        found[k] = q if q @ before >= 0 else -q
+    found = np.array([quaternion_from_matrix(each) for each in rotations])
+    signs = np.where((found[1:] * found[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    found[1:] *= np.cumprod(signs)[:, None]
     return found

@@ -205,7 +205,9 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
         style=Markup(_file("live.css")),
         heading=tag("h1", title_line(case).words),
         task=_task(case, solution) if track is None else _task_markup(track.task),
-        answer=_answer_markup("" if track is None else track.answer) if answer is None else _answer_markup(answer["words"]),
+        answer=_answer_markup("" if track is None else track.answer)
+        if answer is None
+        else _answer_markup(answer["words"]),
         body=_body(case, data, drawing, fault),
         footer=_footer(source, module),
         data=script_json(page),

@@ -84,7 +84,9 @@ def schedule_parts(solution: Solution, command: str) -> LiveParts:
 
 def _without_schedule(solution: Solution) -> Case:
     """Return the case at the first point of the path, with a title that says that no schedule was found."""
-    title = f"{solution.case.title or solution.case.name}: first point of the path. {no_schedule_line(solution.case).words}"
+    title = (
+        f"{solution.case.title or solution.case.name}: first point of the path. {no_schedule_line(solution.case).words}"
+    )
     return replace(solution.outcomes[0].own.nlp.case, title=title)
 
 
@@ -124,9 +126,7 @@ def _case_along(along: _Along) -> Case:
     parameters: dict[str, Any] = {}
     for item in start.model.parameters:
         names = start.component_names(item)
-        values = [
-            settings.get(name, value) for name, value in zip(names, start.components(item.name), strict=True)
-        ]
+        values = [settings.get(name, value) for name, value in zip(names, start.components(item.name), strict=True)]
         parameters[item.name] = values if len(values) > 1 else values[0]
     size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions"))
     return with_free_pose(replace(start, parameters=parameters), problem.points.positions, HALF_TURN, size)
@@ -159,8 +159,16 @@ def _track(solution: Solution, along: _Along, nlp: Nlp) -> Track:
     ]
     count = len(frames)
     data = {
-        **{"places": places, "frames": frames, "panels": [], "path": positions[along.shown].tolist()},
-        **{"nearest": [-1] * count, "margins": [None] * count, "limits": [], "most": 1, "marks": [], "first": 0},
+        "places": places,
+        "frames": frames,
+        "panels": [],
+        "path": positions[along.shown].tolist(),
+        "nearest": [-1] * count,
+        "margins": [None] * count,
+        "limits": [],
+        "most": 1,
+        "marks": [],
+        "first": 0,
         "schedule": _schedule_data(solution, along, nlp, settings),
     }
     shown = schedule_data(schedule)
