@@ -54,6 +54,7 @@ class ScheduleData(JsonObject):
         F: objective of each point.
         bound: proved bound of the objective of all schedules of this design; absent if no proof was requested.
         gap: relative distance of the bound from the objective.
+        reason: reason why the requested gap of the bound was not reached; absent if it was.
         statement: proved statement in words.
         proved: true if the schedule is proved to have no singularity and no violated limit along the whole path; absent
             without limits over the path.
@@ -74,6 +75,7 @@ class ScheduleData(JsonObject):
     F: Vector
     bound: Absent[float]
     gap: Absent[float]
+    reason: Absent[str]
     statement: Absent[str]
     proved: Absent[bool]
     added: Absent[int]
@@ -104,6 +106,7 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         F=vector(schedule.F),
         bound=schedule.bound,
         gap=schedule.gap,
+        reason=schedule.reason or None,
         statement=schedule.statement or None,
         proved=None if schedule.judgement is None else schedule.judgement.is_proved,
         added=None if schedule.judgement is None else schedule.added,

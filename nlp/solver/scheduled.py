@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.rotation import quaternion_from_matrix
 from ...models.values import dataclass
 from ..case.pose import OverPoses
 from ..path.path import Poses
@@ -58,10 +59,13 @@ class Schedule:
         rates: (k,) largest rates of the case, per second; infinite for no limit.
         design: values of the free dimensions of the design, by name.
         bound: proved bound of the objective of all schedules of this design; None without a proof.
+        reason: reason why the gap of the bound was not reached, such as a time limit; empty if it was, or without a
+            request.
         sign: 1 for a maximum, -1 for a minimum.
         seconds: wall time.
         judgement: verdicts on ranks and limits along the whole path; None without limits over the path.
         added: number of points that were added because limits were violated there.
+        is_home_mode: If true, the bound is one of the home working mode; a robot without loops has no other mode.
     """
 
     names: tuple[str, ...]
@@ -82,6 +86,8 @@ class Schedule:
     seconds: float
     judgement: Judgement | None = None
     added: int = 0
+    is_home_mode: bool = False
+    reason: str = ""
 
     @property
     def gain(self) -> float | None:
@@ -113,10 +119,11 @@ class Schedule:
             return ""
         stated = ", ".join(f"{name} = {value:.7g}" for name, value in self.design.items())
         what = f"the design with {stated}" if stated else "this robot"
+        mode = "in the home working mode " if self.is_home_mode else ""
         side = "more" if self.sign > 0 else "less"
         rounded = Context(7, ROUND_CEILING if self.sign > 0 else ROUND_FLOOR).create_decimal_from_float(self.bound)
         return (
-            f"no schedule of {what} within the limits and rates has {side} than {float(rounded):.7g} "
+            f"no schedule of {what} {mode}within the limits and rates has {side} than {float(rounded):.7g} "
             "at the points of the path"
         )
 
@@ -138,17 +145,7 @@ class Schedule:
 
 def _quaternions(rotations: FloatArray) -> FloatArray:
     """Return unit quaternions (N, 4) of rotation matrices (N, 3, 3), each near the one before."""
-    found = np.empty((len(rotations), 4))
-    for k, R in enumerate(rotations):
-        K = np.array(
-            [
-                [R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-                [R[2, 1] - R[1, 2], R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-                [R[0, 2] - R[2, 0], R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
-                [R[1, 0] - R[0, 1], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1]],
-            ]
-        )
-        q = np.linalg.eigh(K)[1][:, -1]
-        before = found[k - 1] if k else np.array([1.0, 0.0, 0.0, 0.0])
-        found[k] = q if q @ before >= 0 else -q
+    found = np.array([quaternion_from_matrix(each) for each in rotations])
+    signs = np.where((found[1:] * found[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    found[1:] *= np.cumprod(signs)[:, None]
     return found

@@ -14,7 +14,7 @@ from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
 from ..units import Units, objective_unit
 from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
-from .numbers import number, per_words, quantity_words, residual, rounded_to
+from .numbers import key_words, number, per_words, quantity_words, residual, rounded_to
 from .objective import objective_words
 from .text import Line, Tone
 
@@ -250,13 +250,19 @@ def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
             yield f"would be feasible with {row.key} = {needed}{unit} instead of {row.limit:g}{unit}"
 
 
-def costliest_words(limits: Sequence[LimitData]) -> str | None:
-    """Return a sentence about the active limit with the largest relative effect on F; None without such a limit."""
+def costliest_words(limits: Sequence[LimitData], *, in_words: bool = False) -> str | None:
+    """Return a sentence about the active limit with the largest relative effect on F; None without such a limit.
+
+    Args:
+        limits: limits of the case.
+        in_words: If true, the key of the limit is in words.
+    """
     costly = [(row, row.cost) for row in limits if row.active and row.cost]
     if not costly:
         return None
     row, cost = max(costly, key=lambda each: ordered(abs(each[1] * (each[0].limit or 1.0))))
-    return f"The active limit with the largest relative effect is {row.key}: F {cost:+.4g} {per_words(row.unit)}."
+    name = key_words(f"limits.{row.key}") if in_words else row.key
+    return f"The active limit with the largest relative effect is {name}: F {cost:+.4g} {per_words(row.unit)}."
 
 
 def active_limit_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:

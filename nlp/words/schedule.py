@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..case.pose import OverPoses
-from ..case.task import LEG_LENGTH
+from ..case.task import LEG_LENGTH, SMALLEST
 from ..results.objective import unit_of_objective
 from ..results.point import task_data
 from .lines import followed_words, task_lines
@@ -23,7 +23,8 @@ def objective_name(case: Case) -> str:
     measure, is_mean = case.tasks[0].measure, case.over_path is OverPoses.MEAN
     if not measure:
         return "mean F" if is_mean else "worst F"
-    name = "longest leg" if measure == LEG_LENGTH else f"largest {measure.replace('_', ' ')}"
+    own = {LEG_LENGTH: "longest leg", SMALLEST: "smallest singular value"}
+    name = own.get(measure, f"largest {measure.replace('_', ' ')}")
     return f"mean {name}" if is_mean else name
 
 
@@ -46,10 +47,17 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
         tone=Tone.ANSWER,
         after=f" {where} ({_gain(schedule)})",
     )
+    if case.model.locked:
+        joints = case.model.locked
+        who = f"actuated joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+        yield Line(f"F is taken with {who} locked at each point of the path", label="note")
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
-        words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"
+        stopped = "" if schedule.reason is None else f"; stopped: {schedule.reason}"
+        words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %{stopped})"
         yield Line(words, label="bound", tone=Tone.HOLDS)
+    elif schedule.reason is not None:
+        yield Line(f"none proved; stopped: {schedule.reason}", label="bound", tone=Tone.NO_ANSWER)
     if schedule.proved is not None:
         points = f"{schedule.added} point{'s' * (schedule.added != 1)} added"
         verdict = "no singularity and no violated limit at any point of the path"

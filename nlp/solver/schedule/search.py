@@ -6,6 +6,7 @@ there. The best one is searched once more on a finer grid.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,7 +21,7 @@ from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses, Rotation
 from ...case.settings import Search
 from ...case.task import Method, Sense, Task
-from ...interruption import is_requested
+from ...interruption import Milestone, is_requested, reached
 from ...path.path import Poses
 from ...program.formulation import formulate
 from ..compromise import solution_of_one_task
@@ -28,7 +29,7 @@ from ..multistart import solve_program
 from ..scheduled import ConstantSetting, Schedule
 from ..solution import Solution
 from ..status import Status
-from .cells import cell_bound, check_certified
+from .cells import CellBound, cell_bound, check_certified
 from .dynamic import constants, seeds
 from .exchange import ProvedSchedule, exchanged
 from .polish import Polished, polish
@@ -61,7 +62,7 @@ def solve_schedule(
         progress: function to call after each design.
 
     Raises:
-        CaseError: the case is not supported along a path, or the bound has more than one setting.
+        CaseError: the case is not supported along a path, or the bound has more than two settings.
         InputError: the path cannot be read.
     """
     began = time.perf_counter()
@@ -93,7 +94,8 @@ def solve_schedule(
     proved = exchanged(problem, best) if case.limits_over else None
     if proved is not None:
         best = _at_stated_points(problem, proved)
-    bound = None if gap is None else cell_bound(problem, best.d, best.value, gap).bound
+    reached(Milestone.START)
+    bound = None if gap is None else cell_bound(problem, best.d, best.value, gap)
     return _solution(problem, best, constant, bound, began, search, proved)
 
 
@@ -140,7 +142,7 @@ def _solution(
     problem: ScheduleProblem,
     best: Polished | None,
     constant: Polished | None,
-    bound: float | None,
+    bound: CellBound | None,
     began: float,
     search: Search,
     proved: ProvedSchedule | None = None,
@@ -181,11 +183,13 @@ def _solution(
         constant=held,
         rates=np.array([each.rate for each in problem.settings], dtype=np.float64) * unit,
         design=_shown_design(problem, best.d),
-        bound=None if bound is None else sign * bound,
+        bound=None if bound is None or not math.isfinite(bound.bound) else sign * bound.bound,
+        reason="" if bound is None else bound.reason,
         sign=sign,
         seconds=seconds,
         judgement=None if proved is None else proved.judgement,
         added=0 if proved is None else proved.added,
+        is_home_mode=bool(case.model.unknowns),
     )
     return replace(found, schedule=schedule)
 

@@ -7,8 +7,8 @@ import { Schedule } from "./schedule.js";
  * @typedef {import("./state.js").State} State
  * @typedef {import("./numbers.js").Vector} Vector
  * @typedef {import("./scene.js").Piece} Piece
- * @typedef {{ words: string, at: number, values: number[] }} Frame point of the path, with the variables of the pose
- * @typedef {{ title: string, unit: string, limits: number[], most: number, curves: { name: string, values: (number | null)[] }[] }} Panel
+ * @typedef {{ words: string, at: number, values: number[], has_time: boolean }} Frame point of the path, with the variables of the pose
+ * @typedef {{ title: string, unit: string, limits: number[], low: number, high: number, base: number, is_speed: boolean, is_lower: boolean, curves: { name: string, values: (number | null)[] }[] }} Panel
  * @typedef {{ places: number[], frames: Frame[], panels: Panel[], path: Vector[], nearest: number[], margins: (number | null)[],
  *   limits: { words: string, colour: string }[], most: number, marks: { words: string, position: Vector }[], first: number,
  *   schedule?: import("./schedule.js").ScheduleData }} TrackData
@@ -16,8 +16,13 @@ import { Schedule } from "./schedule.js";
 
 /** Colours of violated limits, and of a path without limits; stops of the colours of margins. */
 const VIOLATED_COLOUR = "#a3250f", PLAIN = "#68747f", MARGINS = [[163, 37, 15], [224, 138, 60], [154, 163, 171], [8, 81, 156]];
+/** Number of colours of limits in the style sheet of paths. */
+const LIMIT_COLOURS = 8;
 /** Seconds of the whole path. */
 const LAP = 15;
+
+/** Place of a value in the bars of a panel, percent. @param {Panel} panel @param {number} value */
+const partOf = ({ low, high }, value) => Math.max(0, Math.min(100, (100 * (value - low)) / (high - low)));
 
 /** Colour of a margin as a part of the largest one with a different colour. @param {number} part */
 const marginColour = (part) => {
@@ -83,8 +88,8 @@ export class Track {
     this.bars = this.data.panels.map((panel) => {
       const rows = panel.curves.map(({ name, values }) => {
         const fill = make("i", {}), value = make("output", { class: "value" });
-        const marks = panel.limits.map((limit) => make("b", { style: `left: ${(50 + (50 * limit) / panel.most).toFixed(2)}%` }));
-        const element = make("div", { class: "drive" }, make("span", {}, name), make("span", { class: "track" }, fill, ...marks), value);
+        const marks = panel.limits.map((limit) => make("b", { style: `left: ${partOf(panel, limit).toFixed(2)}%` }));
+        const element = make("div", { class: panel.base === panel.low ? "drive ranged" : "drive" }, make("span", {}, name), make("span", { class: "track" }, fill, ...marks), value);
         return { element, fill, value, values };
       });
       place.append(make("div", { class: "panel" }, make("h2", {}, panel.unit ? `${panel.title}, ${panel.unit}` : panel.title), ...rows.map((each) => each.element)));
@@ -171,7 +176,7 @@ export class Track {
 
   /** Shows the point: words, marks of the curves, bars. */
   refresh() {
-    const { words, at } = this.data.frames[this.index], isCase = this.isCase();
+    const { words, at, has_time } = this.data.frames[this.index], isCase = this.isCase();
     this.slider.value = String(this.index);
     this.slider.setAttribute("aria-valuetext", words);
     if (this.travelled) this.travelled.textContent = words;
@@ -188,11 +193,11 @@ export class Track {
       for (const { element, fill, value, values } of rows) {
         const now = values[this.index];
         element.parentElement.hidden = !isCase;
-        value.textContent = now === null ? "unknown" : measured(now, "", 5);
-        const part = now === null ? 0 : (50 * now) / panel.most;
-        fill.style.left = `${Math.min(50, 50 + part).toFixed(2)}%`;
-        fill.style.width = `${Math.abs(part).toFixed(2)}%`;
-        const isOver = now !== null && panel.limits.length > 0 && (now > high || (panel.limits.length > 1 && now < low));
+        value.textContent = now === null ? (panel.is_speed && !has_time ? "no time" : "unknown") : measured(now, "", 5);
+        const base = partOf(panel, panel.base), part = now === null ? base : partOf(panel, now);
+        fill.style.left = `${Math.min(base, part).toFixed(2)}%`;
+        fill.style.width = `${Math.abs(part - base).toFixed(2)}%`;
+        const isOver = now !== null && panel.limits.length > 0 && ((now > high && !panel.is_lower) || ((panel.limits.length > 1 || panel.is_lower) && now < low));
         element.classList.toggle("over", isOver);
       }
     }
@@ -201,15 +206,18 @@ export class Track {
   /** Pieces of the path in the picture. @param {import("./scene.js").Axes} axes @param {Record<string, string>} colours @returns {Piece[]} */
   pieces(axes, colours) {
     const { path, nearest, margins, limits, most, marks } = this.data, byMargin = this.colour?.value === "margin";
+    // The legend of the page has the colours of its scheme.
+    const style = getComputedStyle(this.page.documentElement), named = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
+    const violated = named("edge") || VIOLATED_COLOUR;
     /** @type {Piece[]} */
     const found = [];
     path.slice(1).forEach((to, k) => {
       const margin = margins[k], from = path[k];
-      const byLimit = margin !== null && margin < 0 ? VIOLATED_COLOUR : nearest[k] < 0 ? PLAIN : limits[nearest[k]].colour;
+      const byLimit = margin !== null && margin < 0 ? violated : nearest[k] < 0 ? PLAIN : named(`l${nearest[k] % LIMIT_COLOURS}`) || limits[nearest[k]].colour;
       const colour = byMargin && margin !== null ? marginColour(margin / most) : byLimit;
       found.push({ kind: "line", points: [from, to], colour, width: 3, depth: (dot(from, axes.towards) + dot(to, axes.towards)) / 2 });
     });
-    const dots = /** @type {[Vector, string][]} */ ([...marks.map((each) => [each.position, VIOLATED_COLOUR]), [/** @type {Vector} */ (this.data.frames[this.index].values.slice(0, 3)), colours.ink]]);
+    const dots = /** @type {[Vector, string][]} */ ([...marks.map((each) => [each.position, violated]), [/** @type {Vector} */ (this.data.frames[this.index].values.slice(0, 3)), colours.ink]]);
     for (const [at, colour] of dots) found.push({ kind: "dot", points: [at], colour, width: 5, depth: dot(at, axes.towards) + 0.05 * this.state.data.scene.size });
     return found;
   }
