@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -15,7 +14,7 @@ import pytest
 from builders import Run, assert_words, output_of, saved
 from test_live_pages import IN_VIEW, POSE, READY, act, faults, fits, words
 from test_schedule_measures import _ANY_FORCE, _RADIUS, _forces, _minimised
-from test_schedules import _DEGREE, _YAW, _circle, _objective, _struts, _written
+from test_schedules import _DEGREE, _circle, _objective, _struts, _written
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import load_case, solve
@@ -121,18 +120,20 @@ def test_the_robot_follows_the_schedule(opened: Callable[..., Any], cli: Run, tm
         assert (words(chrome, "F"), words(chrome, "word")) == ("mean F = 1.657882 (in/in)²", "best constant")
         act(chrome, CLICK, "show-schedule")
     # A moved turn is computed in the page, which says whether the rate of the turn reaches it.
-    act(chrome, TRAVEL, 57)
+    act(chrome, TRAVEL, 145)
     turns, dt = schedule.values[:, 0], schedule.times[1]
-    low, high = max(turns[56], turns[58]) - 5 * dt, min(turns[56], turns[58]) + 5 * dt
+    low, high = max(turns[144], turns[146]) - 5 * dt, min(turns[144], turns[146]) + 5 * dt
+    assert low < high - 0.01
     for turn, is_near in ((0.5 * (low + high), True), (high + 1.0, False), (low - 1.0, False)):
         act(chrome, SET, 0, turn)
-        _check_point(chrome, angles[57], positions[57], turn * _DEGREE)
+        _check_point(chrome, angles[145], positions[145], turn * _DEGREE)
         assert words(chrome, "word") == "point"
         assert_words(words(chrome, "words"), "computed in this page", "other turn than the schedule")
         assert ("does not reach" in words(chrome, "words")) is not is_near
         note = chrome.execute_script(f"{IN_VIEW} return root.querySelector('.reach').textContent")
         assert_words(note, "within" if is_near else "outside", "at most 5 deg/s")
     # A violated limit is named, and the next point has the schedule again.
+    act(chrome, TRAVEL, 57)
     act(chrome, SET, 0, 60.0)
     assert np.linalg.norm(_struts(angles[57], positions[57], 60 * _DEGREE), axis=1).max() > 43
     assert_words(words(chrome, "words"), "violated")
@@ -179,8 +180,7 @@ def test_a_point_of_a_schedule_goes_out_and_comes_back(opened: Callable[..., Any
     wait = "return new Promise((done) => setTimeout(() => done(screwsynth.track.index), 1500))"
     assert chrome.execute_script(wait) > 0
     act(chrome, CLICK, "play")
-    text = "const root = document; return root.getElementById('play').textContent"
-    assert chrome.execute_script(text) == "Play"
+    assert words(chrome, "play") == "Play"
     assert faults(chrome) == []
 
 
@@ -207,7 +207,7 @@ def test_a_dimension_moves_along_the_path(opened: Callable[..., Any], cli: Run, 
         # The base joints are on a circle with the radius of the schedule, the platform joints on one of the design.
         position = schedule.poses.positions[index]
         base = np.hypot(points[:, 0], points[:, 1])[np.abs(points[:, 2]) < 1e-12]
-        np.testing.assert_allclose(base[:6], schedule.values[index, 0], rtol=1e-9)
+        assert np.isclose(base, schedule.values[index, 0], rtol=1e-9).sum() >= 6
         near = np.linalg.norm(points - position, axis=1)
         assert np.isclose(near, schedule.design["x2"], rtol=1e-9).sum() >= 6
     # The best constant has a design of its own, and so has the robot.
@@ -297,7 +297,7 @@ def test_without_a_compiler_the_page_has_the_answer(
     assert faults(chrome) == []
 
 
-def test_a_turn_in_the_page_is_that_of_rotation_matrices() -> None:
+def test_a_turn_in_the_page_is_that_of_rotation_matrices(tmp_path: Path) -> None:
     node = shutil.which("node")
     if node is None:
         pytest.skip("Node is not installed")
@@ -312,13 +312,12 @@ def test_a_turn_in_the_page_is_that_of_rotation_matrices() -> None:
         q, axis = rng.normal(size=4), rng.normal(size=3)
         q, axis = q / np.linalg.norm(q), axis / np.linalg.norm(axis)
         given.append({"q": (q if q[0] > 0 else -q).tolist(), "axis": axis.tolist(), "angle": float(angle)})
-    module = Path(live.__file__).parent / "page" / "schedule.js"
-    # Node takes the files as modules by their suffix only in a folder that says so.
-    script = Path(__file__).parent / "turned_about.mjs"
-    flags = ["--experimental-default-type=module"] if re.match(r"v(18|20)\.", _version(node)) else []
-    done = subprocess.run(
-        [node, *flags, str(script), str(module), json.dumps(given)], capture_output=True, text=True, check=False
-    )
+    # Node takes the files as modules only in a folder that says so.
+    folder = tmp_path / "page"
+    shutil.copytree(Path(live.__file__).parent / "page", folder)
+    saved(folder / "package.json", '{"type": "module"}')
+    words = [node, str(Path(__file__).parent / "turned_about.mjs"), str(folder / "schedule.js"), json.dumps(given)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for each, v in zip(given, json.loads(done.stdout), strict=True):
         w = np.sqrt(max(0.0, 1 - np.dot(v, v)))
@@ -327,12 +326,7 @@ def test_a_turn_in_the_page_is_that_of_rotation_matrices() -> None:
         np.testing.assert_allclose(matrix(w, np.array(v)), expected, atol=1e-7)
 
 
-def _version(node: str) -> str:
-    return subprocess.run([node, "--version"], capture_output=True, text=True, check=True).stdout
-
-
 def test_solve_names_the_motion_and_the_unit(cli: Run, tmp_path: Path) -> None:
     drill = ('follows = "feed"                     # the direction of the feed at each point', 'follows = "tool"')
     out = " ".join(output_of(cli("solve", str(_written(tmp_path, drill, count=12)))).split())
     assert_words(out, "max F: rotation about the tool's axis at each point", "(in/rad)² along")
-    assert _YAW.exists()

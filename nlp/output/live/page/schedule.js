@@ -229,7 +229,13 @@ export class Schedule {
   /** Whether everything is as the program found it. */
   isProgram() {
     const { state } = this, { limits } = state.module.arrays;
-    return !this.moved && this.isCase && state.limits.every((each, k) => limits[k] === each.value);
+    return !this.movedNames().length && this.isCase && state.limits.every((each, k) => limits[k] === each.value);
+  }
+
+  /** Names of the settings that were moved away from those of the program. */
+  movedNames() {
+    const own = this.own(this.index), { moved } = this;
+    return this.data.settings.filter(({ low, high }, k) => moved && Math.abs(moved[k] - own[k]) > SAME * (high - low)).map((each) => each.name);
   }
 
   /** Range of a setting that its rate reaches from both neighbours, in units of computations; null without a rate. @param {number} k @returns {[number, number] | null} */
@@ -250,7 +256,7 @@ export class Schedule {
     if (!reach) return { words: `${now}${most}`, isOut: false };
     const value = this.values()[k], slack = SAME * (high - low), isOut = value < reach[0] - slack || value > reach[1] + slack;
     const range = `${digits(reach[0] * factor, 5)} to ${measured(reach[1] * factor, unit, 5)}`;
-    if (!this.moved || value === this.own(index)[k]) return { words: `${now}${most}; reachable from the neighbouring points: ${range}`, isOut: false };
+    if (!this.movedNames().includes(name)) return { words: `${now}${most}; reachable from the neighbouring points: ${range}`, isOut: false };
     return { words: `${name} is ${isOut ? "outside" : "within"} ${range}, the range that its rate reaches from the neighbouring points (${most})`, isOut };
   }
 
@@ -261,11 +267,10 @@ export class Schedule {
     // Texts of the program get the minus signs of the page.
     const proper = (/** @type {string} */ text) => text.replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
     if (this.isProgram()) return { value: proper(told.value), word: told.word, words: proper(told.words), isFault: !data.isAnswer, isProgram: data.isAnswer };
-    const own = this.own(this.index), { moved } = this;
-    const names = data.settings.filter((_, k) => moved && moved[k] !== own[k]).map((each) => each.name);
+    const names = this.movedNames();
     if (!this.isCase) names.push("dimensions");
     if (state.limits.some((each, k) => state.module.arrays.limits[k] !== each.value)) names.push("limits");
-    const isOut = Boolean(moved) && data.settings.some((_, k) => this.rateWords(k).isOut);
+    const isOut = data.settings.some((_, k) => this.rateWords(k).isOut);
     const words = `computed in this page at this point, with other ${names.join(", ")} than the ${this.isConstant ? "best constant" : "schedule"}${isOut ? "; the rate does not reach it from the neighbouring points" : ""}`;
     return { value: `${this.pointName()} = ${measured(this.value(), data.unit)}`, word: "point", words, isFault: false, isProgram: false };
   }
@@ -274,7 +279,7 @@ export class Schedule {
   refresh(isCase) {
     this.isCase = isCase;
     const { data, index } = this, now = this.values();
-    this.choices?.forEach((button, k) => button.setAttribute("aria-pressed", String((k === 1) === this.isConstant && !this.moved)));
+    this.choices?.forEach((button, k) => button.setAttribute("aria-pressed", String((k === 1) === this.isConstant && !this.movedNames().length)));
     this.rows?.forEach(({ range, entry, note }, k) => {
       const { unit, factor } = data.settings[k], value = now[k] * factor, text = digits(value), { words, isOut } = this.rateWords(k);
       if (Math.abs(Number(range.value) - value) > SAME * Math.abs(value)) range.value = String(value);
@@ -375,9 +380,9 @@ export class Schedule {
   fragment() {
     const { state, data } = this, parts = new URLSearchParams({ point: String(this.index + 1) }), stated = this.stated();
     if (this.isConstant) parts.set("shown", "constant");
-    const own = this.own(this.index), { moved } = this;
+    const now = this.values(), moved = this.movedNames();
     data.settings.forEach(({ name, factor }, k) => {
-      if (moved && moved[k] !== own[k]) parts.set(name, String(moved[k] * factor));
+      if (moved.includes(name)) parts.set(name, String(now[k] * factor));
     });
     for (const each of state.sliders) if (each.group === "dimension" && each.vector === "p" && state.module.arrays.p[each.index] !== stated[each.index]) parts.set(each.name, String(state.read(each)));
     state.limits.forEach((limit, k) => {
