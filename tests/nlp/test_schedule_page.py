@@ -184,11 +184,19 @@ def test_a_point_of_a_schedule_goes_out_and_comes_back(opened: Callable[..., Any
     assert faults(chrome) == []
 
 
+_HELD = ("{ min = -75, max = 75, rate = 5 }", "20")
+_FREE = [("x2 = 11.543", "x2 = { min = 10, max = 12 }"), ("[objective]", "[solve]\nstarts = 2\n\n[objective]")]
+
+
 @needs_compiler
 @pytest.mark.browser
-def test_a_dimension_moves_along_the_path(opened: Callable[..., Any], cli: Run, tmp_path: Path) -> None:
-    changes = [("x1 = 26.5", _RADIUS), ("x2 = 11.543", "x2 = { min = 10, max = 12 }")]
-    case = _written(tmp_path, *changes, ("[objective]", "[solve]\nstarts = 2\n\n[objective]"), count=12)
+@pytest.mark.parametrize(
+    "changes", [[_HELD], pytest.param(_FREE, marks=pytest.mark.soak)], ids=["one setting", "two settings and a design"]
+)
+def test_a_dimension_moves_along_the_path(
+    opened: Callable[..., Any], cli: Run, tmp_path: Path, changes: list[tuple[str, str]]
+) -> None:
+    case = _written(tmp_path, ("x1 = 26.5", _RADIUS), *changes, count=12)
     page = tmp_path / "page.html"
     output_of(cli("report", str(case), "--out", str(page)))
     schedule = solve(load_case(str(case))).schedule
@@ -209,12 +217,12 @@ def test_a_dimension_moves_along_the_path(opened: Callable[..., Any], cli: Run, 
         base = np.hypot(points[:, 0], points[:, 1])[np.abs(points[:, 2]) < 1e-12]
         assert np.isclose(base, schedule.values[index, 0], rtol=1e-9).sum() >= 6
         near = np.linalg.norm(points - position, axis=1)
-        assert np.isclose(near, schedule.design["x2"], rtol=1e-9).sum() >= 6
+        assert np.isclose(near, schedule.design.get("x2", 11.543), rtol=1e-9).sum() >= 6
     # The best constant has a design of its own, and so has the robot.
     act(chrome, CLICK, "show-constant")
     points = np.reshape(chrome.execute_script(POSE)[3], (-1, 3))
     near = np.linalg.norm(points - schedule.poses.positions[last], axis=1)
-    assert np.isclose(near, schedule.constant.design["x2"], rtol=1e-9).sum() >= 6
+    assert np.isclose(near, schedule.constant.design.get("x2", 11.543), rtol=1e-9).sum() >= 6
     assert _value(chrome) == pytest.approx(data["constant"]["F"][-1], rel=1e-9)
     assert words(chrome, "word") == "best constant"
     assert faults(chrome) == []

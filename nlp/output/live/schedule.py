@@ -231,6 +231,7 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
         "follows": [each.follows for each in case.tasks],
         "weights": [each.weight for each in case.tasks],
         "measure": case.tasks[0].measure,
+        "length": case.tasks[0].length or 1.0,
         "isWorst": case.over_path is OverPoses.WORST,
         "sign": schedule.sign,
         "unit": unit_of_objective(case),

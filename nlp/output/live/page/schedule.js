@@ -14,7 +14,7 @@ import { unpack } from "./text.js";
  * @typedef {Told & { isFault: boolean, isProgram: boolean }} Headline
  * @typedef {{ settings: Setting[], rows: number[][], reach: [number, number][][], step: (number | null)[][], rates: (number | null)[][],
  *   F: number[], value: number, constant: { row: number[], design: number[], F: number[], value: number } | null, design: { places: number[], values: number[] },
- *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, hasSlopes: boolean, isWorst: boolean, sign: number,
+ *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, length: number, hasSlopes: boolean, isWorst: boolean, sign: number,
  *   unit: string, isTimed: boolean, isAnswer: boolean, name: string, schedule: Told, held: Told | null, maps: MapData[],
  *   table: string | null }} ScheduleData rows, reach and step in units of computations; turn is that of a tool without a setting
  */
@@ -214,6 +214,7 @@ export class Schedule {
       const terms = block("F").map((each, k) => each * data.weights[k]);
       return data.isWorst ? (data.sign > 0 ? Math.min(...terms) : Math.max(...terms)) : terms.reduce((sum, each) => sum + each, 0);
     }
+    if (data.measure === "smallest_singular_value") return state.module.smallestSingularValue(data.length);
     if (data.measure === "leg_length") {
       const at = state.data.quantities.findIndex((/** @type {any} */ each) => each.name === "leg_length");
       if (at < 0) return NaN;
