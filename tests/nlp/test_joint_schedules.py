@@ -400,5 +400,5 @@ def test_idle_passive_joints_are_no_settings(tmp_path: Path) -> None:
     case = load_case(str(saved(tmp_path / "case.toml", text)))
     assert list(case.settings) == ["joint.1:1", "joint.2:1", "joint.3:1"]
     assert [each.name for each in schedule_problem(case).settings] == list(case.settings)
-    with pytest.raises(CaseError, match=r"joint 1:2 is not actuated"):
+    with pytest.raises(CaseError, match=r"joint 1:2 is of type S"):
         load_case(str(saved(tmp_path / "spin.toml", text.replace('"1:1" =', '"1:2" ='))))
