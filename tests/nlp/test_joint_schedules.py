@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from functools import cache
 from pathlib import Path
 
@@ -352,7 +353,10 @@ def test_results_and_files_name_the_joint(folder: Path, cli: Run) -> None:
         ((("rail =", '"1:3" ='),), ("limits.joint.1:3.per", "joint 1:3 is not actuated", "allowed: 1:1")),
         ((("rail =", '"2:1" ='),), ("limits.joint.2:1.per", "joint 2:1 follows from the pose", "allowed: 1:1")),
         (((f"rail = {MOVING}", ""),), ("limits.joint.1:1", "needs min and max", "does not determine")),
-        ((('over = "path"\nas = "mean"', ""),), ("objective", "joint.rail changes along the path")),
+        (
+            (('[objective]\nover = "path"\nas = "mean"', ""), ('follows = "feed"', "axis = [1, 0, 0]\npitch = inf")),
+            ("objective", "joint.rail changes along the path"),
+        ),
         (
             (('file = "robot.toml"', 'file = "robot.toml", parameters = { "joint.1:1" = { min = 0, max = 1 } }'),),
             ("robot.parameters.joint.1:1", "must be a number", "limits.joint"),
@@ -402,3 +406,17 @@ def test_idle_passive_joints_are_no_settings(tmp_path: Path) -> None:
     assert [each.name for each in schedule_problem(case).settings] == list(case.settings)
     with pytest.raises(CaseError, match=r"joint 1:2 is of type S"):
         load_case(str(saved(tmp_path / "spin.toml", text.replace('"1:1" =', '"1:2" ='))))
+
+
+def test_the_example_of_the_page(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "changing.md").read_text(encoding="utf-8")
+    part = page[page.index("### Driven rails along a path") :]
+    robot, case = re.findall(r"```toml\n(.*?)```", part, re.DOTALL)[:2]
+    circle(tmp_path)
+    (tmp_path / "path.csv").rename(tmp_path / "circle.csv")
+    saved(tmp_path / "three-rails.toml", robot)
+    schedule = solve(load_case(str(saved(tmp_path / "case.toml", case)))).schedule
+    assert schedule is not None
+    assert schedule.constant is not None
+    value, constant = (f"{each:.7g}" for each in (schedule.value, schedule.constant.value))
+    assert f"mean F = {value} along 192 segments (best constant joint.1:1 {constant}, " in part
