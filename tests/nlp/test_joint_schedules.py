@@ -148,11 +148,11 @@ class Points:
         extra = (slice(None), *[None] * (rail.ndim - 1))
         return work(limb, rail, self.at[extra], self.feed[extra])
 
-    def searched(self, limb: int, size: int = 1201, rate: float = RATE) -> tuple[float, float]:
+    def searched(self, limb: int, size: int = 1601, rate: float = RATE) -> tuple[float, float]:
         """Return the best mean part of a limb over all schedules of grid values within the rate, and over constants."""
         grid = np.linspace(-RAIL, RAIL, size)
         gain = self.weights[:, None] * self.part(limb, np.broadcast_to(grid, (len(self.at), size)))
-        reach = np.floor(rate * np.diff(self.times) / (grid[1] - grid[0])).astype(int)
+        reach = np.floor(rate * np.diff(self.times) / (grid[1] - grid[0]) + 1e-9).astype(int)
         level = gain[0]
         for k, width in enumerate(reach.tolist()):
             wide = np.concatenate([np.full(width, -np.inf), level, np.full(width, -np.inf)])
@@ -181,8 +181,8 @@ def test_a_rail_has_the_schedule_of_an_exhaustive_search(folder: Path) -> None:
     rest = sum(points.part(limb, np.zeros(len(rail))) for limb in (1, 2))
     np.testing.assert_allclose(schedule.F, points.part(0, rail) + rest, rtol=1e-8)
     fixed, (best, constant) = float(points.weights @ rest), points.searched(0)
-    # Schedules of grid values are some of all schedules; the gap is that of the grid.
-    assert fixed + best <= schedule.value * (1 + 1e-9) <= fixed + best + 2e-4
+    # The grid divides the steps that the rate allows, so the gap is of second order in its width.
+    assert fixed + best - 1e-7 <= schedule.value <= fixed + best + 2e-6
     assert schedule.constant is not None
     assert schedule.constant.value == pytest.approx(fixed + constant, rel=1e-6)
     assert schedule.gain == pytest.approx(schedule.value / (fixed + constant) - 1, rel=1e-4)
@@ -242,7 +242,7 @@ def test_an_altered_schedule_is_refused_or_refuted(folder: Path, cli: Run) -> No
 
 def test_three_rails_move_as_each_one_alone(tmp_path: Path) -> None:
     """Each rail is in one part of F, and on a circle the limbs follow each other after a third of the time."""
-    circle(tmp_path, 60)
+    circle(tmp_path, 24)
     limits = "\n".join(f'"{k}:1" = {MOVING}' for k in (1, 2, 3))
     schedule = solve(load_case(planar(tmp_path, case_text(limits, "periodic = true"), 3))).schedule
     assert schedule is not None
