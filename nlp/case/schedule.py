@@ -10,7 +10,7 @@ from ...models.model import joint_parameter
 from ..errors import CaseError, listing
 from .pathfile import PathFile
 from .pose import Free, OverPoses, Rotation, Value
-from .task import FOLLOWS, LEG_LENGTH, Task
+from .task import ALONG, FOLLOWS, Task
 from .workspace import Workspace
 
 
@@ -53,10 +53,10 @@ def check_settings(case: ScheduledCase) -> None:
             fault = f'{key} changes along the path, which needs over = "path" and as = "mean" or "worst"'
             raise CaseError("objective", fault)
     for index, task in enumerate(case.tasks):
-        if task.measure == LEG_LENGTH and case.over_path is None:
-            raise CaseError("objective.minimise", 'needs over = "path" and as = "mean" or "worst"', task.measure)
+        if task.measure in ALONG and case.over_path is None:
+            raise CaseError(task.objective_key, 'needs over = "path" and as = "mean" or "worst"', task.measure)
         if task.measure and task.follows:
-            fault = f"conflicts with objective.minimise = {task.measure!r}, which needs no motion; remove [[task]]"
+            fault = f"conflicts with {task.objective_key} = {task.measure!r}, which needs no motion; remove [[task]]"
             raise CaseError(f"task[{index}].follows", fault, task.follows)
         if task.follows:
             _check_follows(case, f"task[{index}].follows", task.follows)

@@ -135,7 +135,8 @@ def _lines(case: Case) -> Iterator[str]:
         over = case.limits_over if case.worst_everywhere else None
         along = None if case.over_path is None else case.over_path.value
         over = "path" if along else over
-        yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over, "as": along})
+        measure = {task.objective_key.partition(".")[2]: task.measure or None, "length": task.length}
+        yield from toml_table("[objective]", {**measure, "over": over, "as": along})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
     yield from toml_table("[controller]", case.controller.to_keys(driven_joints(model), units))
