@@ -226,7 +226,7 @@ class ScheduleProblem:
         count = len(self.points)
         design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
         found = function.map(count)(design, np.reshape(s, (count, -1)).T, self.numbers)
-        return np.abs(found.full()).max(axis=0, initial=0.0)
+        return np.asarray(np.abs(found.full()).max(axis=0, initial=0.0))
 
     def combined(self, objective: FloatArray) -> FloatArray:
         """Return the value of each point from its objectives (..., T): their sum, or the worst."""
