@@ -51,7 +51,9 @@ def _parts_of(name: str, head: str, body: Sequence[str]) -> list[str]:
             made, result = _ASSIGNMENT.match(line), _RESULT.match(line)
             if made is None and result is None:
                 return []
-            first |= set(_VARIABLE.findall((made.group(2) if made else result.group(1)) if made or result else "")) - own
+            first |= (
+                set(_VARIABLE.findall((made.group(2) if made else result.group(1)) if made or result else "")) - own
+            )
             own |= {made.group(1)} if made else set()
         read.append(first)
         written.append(own)
