@@ -356,9 +356,10 @@ def _refusal(cli: Run, *arguments: str) -> str:
 
 
 def test_commands_refuse_what_they_cannot_do(tmp_path: Path, cli: Run) -> None:
-    two = str(_written(tmp_path, _PER_PATH))
-    assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(
-        cli, "solve", two, "--certify"
+    own = ("x1 = 26.5", 'x1 = { min = 18, max = 34, per = "path", rate = 0.5 }')
+    three = str(_written(tmp_path, _PER_PATH, own))
+    assert "certify: bounds schedules of at most two changing numbers; this case has 3" in _refusal(
+        cli, "solve", three, "--certify"
     )
     assert "turn changes along the path, but this command takes one robot" in _refusal(cli, "evaluate", str(_YAW))
     free = str(_written(tmp_path, ("x1 = 26.5", "x1 = { min = 20, max = 30 }")))

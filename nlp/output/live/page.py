@@ -56,6 +56,7 @@ SCRIPTS = (
     "jumps.js",
     "map.js",
     "play.js",
+    "schedule.js",
     "track.js",
     "main.js",
 )
@@ -84,10 +85,16 @@ class Track:
     Attributes:
         x: (n,) variables at the first shown posture.
         data: data of the script: postures, path, violations, and curves at each posture.
+        names: settings that change along the path, whose sliders are those of the track.
+        answer: headline of the page before its script starts.
+        task: motions of the tasks in words.
     """
 
     x: FloatArray
     data: dict[str, Any]
+    names: tuple[str, ...] = ()
+    answer: str = ""
+    task: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +143,9 @@ class LiveParts:
     size: int
 
 
-def live_page(source: ViewSource, solution: Solution | None, command: str) -> LivePage:
+def live_page(source: ViewSource, solution: Solution | None, command: str, track: Track | None = None) -> LivePage:
     """Return the live page of a case; the arguments are those of :func:`live_parts`."""
-    parts = live_parts(source, solution, command)
+    parts = live_parts(source, solution, command, track)
     case = source.subject.nlp.case
     texts = {name: getattr(parts, name) for name in _PIECES}
     title = tag("title", f"{case.title or case.name} - screwsynth")
@@ -168,6 +175,9 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     if track is not None:
         # The range of rotations is only that of the path.
         data["rows"] = [each for each in data["rows"] if each["name"] != "angle"]
+        for slider in data["sliders"]:
+            if slider["name"] in track.names:
+                slider["group"] = "setting"
     page = {
         **data,
         "scene": _scene(drawing),
@@ -194,8 +204,10 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     return LiveParts(
         style=Markup(_file("live.css")),
         heading=tag("h1", title_line(case).words),
-        task=_task(case, solution),
-        answer=_answer_markup(answer),
+        task=_task(case, solution) if track is None else _task_markup(track.task),
+        answer=_answer_markup("" if track is None else track.answer)
+        if answer is None
+        else _answer_markup(answer["words"]),
         body=_body(case, data, drawing, fault),
         footer=_footer(source, module),
         data=script_json(page),
@@ -250,11 +262,11 @@ def _combined_words(solution: Solution) -> str:
     return f"{'; '.join(parts)}   ({solution.status.value})"
 
 
-def _answer_markup(answer: dict[str, Any] | None) -> Markup:
+def _answer_markup(words: str) -> Markup:
     """Return the content of the headline; the script fills it after a change."""
     return join_markup(
         [
-            tag("span", "" if answer is None else answer["words"], id="F"),
+            tag("span", words, id="F"),
             tag("span", id="word"),
             tag("span", id="words"),
         ]
@@ -267,6 +279,11 @@ def _task(case: Case, solution: Solution | None) -> Markup:
     lines: list[Line] = []
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
         lines = [*task_lines(result.robot.task, case.units)]
+    return _task_markup(lines)
+
+
+def _task_markup(lines: Sequence[Line]) -> Markup:
+    """Return the place of the task in words."""
     return tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 

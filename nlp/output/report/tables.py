@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from ...words.numbers import key_words
 from ...words.text import Line, TextTable
 from .markup import Markup, join_markup, tag
 
@@ -37,11 +38,15 @@ class _Content(NamedTuple):
 def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
     """Return an HTML table, whose first column names the rows; a wide table can be scrolled, also by keyboard.
 
+    Keys of limits in caption and headers become words; cells keep the keys, because users copy them into commands.
+
     Args:
         table: table of texts.
         caption: caption of the table.
         attributes: attributes of the element, as for :func:`tag`.
     """
+    caption = key_words(caption)
+    caption = f"{caption[:1].upper()}{caption[1:]}"
     kept = len(table.rows) - table.folded
     shown = _table_element(_content(replace(table, rows=table.rows[:kept])), caption, **attributes)
     if not table.folded:
@@ -59,10 +64,10 @@ def _table_element(content: _Content, caption: str, **attributes: object) -> Mar
     # An empty header is an ordinary cell, since it names nothing.
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
     is_long = len(rows) >= _ONE_LINE
-    aligned = [_aligned([row[k] for row in rows]) for k in range(len(headers))]
+    cells_of = [aligned([row[k] for row in rows]) for k in range(len(headers))]
     body = []
     for place, row in enumerate(rows):
-        first, *others = (column[place] for column in aligned)
+        first, *others = (column[place] for column in cells_of)
         cells = [_cell(text, content, is_long=is_long) for text, content in zip(row[1:], others, strict=True)]
         kind = "long" if len(row[0]) > _LONG else None
         body.append(tag("tr", tag("th", first, scope="row", class_=kind), *cells))
@@ -75,7 +80,7 @@ def _table_element(content: _Content, caption: str, **attributes: object) -> Mar
 
 def _content(table: TextTable) -> _Content:
     """Return headers and rows, with units at their numbers and without columns that are equal in all rows."""
-    headers = [header.replace("\n", ", ") for header in table.headers]
+    headers = [key_words(header).replace("\n", ", ") for header in table.headers]
     rows = [[_related(cell.words if isinstance(cell, Line) else str(cell)) for cell in row] for row in table.rows]
     above: list[str] = []
     at = headers.index("unit") if table.with_unit and "unit" in headers else None
@@ -122,7 +127,7 @@ def _related(text: str) -> str:
     return text.replace("<= ", "\N{LESS-THAN OR EQUAL TO} ").replace(">= ", "\N{GREATER-THAN OR EQUAL TO} ")
 
 
-def _aligned(texts: Sequence[str]) -> list[object]:
+def aligned(texts: Sequence[str]) -> list[object]:
     """Return the cells of a column; digits before the point have the same width in all of them, so points align."""
     found = [_NUMBER.fullmatch(text) for text in texts]
     numbers = [each for each in found if each is not None]

@@ -152,17 +152,40 @@ def _only(values: FloatArray, index: int | None) -> FloatArray:
     return kept
 
 
-def sliding_maximum(values: FloatArray, reach: int) -> FloatArray:
-    """Return the largest of the values (M,) within some steps to both sides of each value."""
-    size = len(values)
-    reach = min(reach, size)
-    padded = np.concatenate([np.full(reach, _OUT), values, np.full(reach, _OUT)])
+def sliding_maximum(
+    values: FloatArray, reach: int, *, shift: int = 0, size: int | None = None, axis: int = 0
+) -> FloatArray:
+    """Return the largest of the values within some steps to both sides of each place; minus infinity without any.
+
+    Args:
+        values: (M, ...) values along an axis.
+        reach: number of steps to both sides.
+        shift: place of the first result, from the first value.
+        size: number of results; that of the values if left out.
+        axis: the axis.
+    """
+    count = values.shape[axis]
+    size = count if size is None else size
+    # No place is further from a value.
+    reach = min(reach, max(shift + size - 1, count - 1 - shift, 0))
+    begin, length = shift - reach, size + 2 * reach
+    padded = np.full((*values.shape[:axis], length, *values.shape[axis + 1 :]), _OUT)
+    first, last = max(begin, 0), min(begin + length, count)
+    if first < last:
+        padded[_along(axis, first - begin, last - begin)] = values[_along(axis, first, last)]
     width, done = 2 * reach + 1, 1
     while 2 * done <= width:
-        padded = np.maximum(padded[:-done], padded[done:])
+        length = padded.shape[axis]
+        padded = np.maximum(padded[_along(axis, 0, length - done)], padded[_along(axis, done, length)])
         done *= 2
     rest = width - done
-    return padded[:size] if rest == 0 else np.maximum(padded[:size], padded[rest : rest + size])
+    found = padded[_along(axis, 0, size)]
+    return found if rest == 0 else np.maximum(found, padded[_along(axis, rest, rest + size)])
+
+
+def _along(axis: int, begin: int, end: int) -> tuple[slice, ...]:
+    """Return the index of a part of an array along an axis."""
+    return (*[slice(None)] * axis, slice(begin, end))
 
 
 def seeds(
