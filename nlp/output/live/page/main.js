@@ -217,7 +217,7 @@ poseChoice?.addEventListener("change", () => change(() => {
 }));
 
 // Texts that the program wrote get the minus signs of the page.
-for (const each of document.querySelectorAll("#stated-task p, #F")) each.textContent = (each.textContent ?? "").replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
+for (const each of document.querySelectorAll("#stated-task p, #F, #task-values li")) each.textContent = (each.textContent ?? "").replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
 document.documentElement.classList.toggle("still", !data.has_module);
 show();
 if (data.has_module) {

@@ -113,6 +113,17 @@ export class Sliders {
   }
 }
 
+/** F of each of several tasks as a part of its separate optimum, in the words of `page.py`. @param {State} state */
+const showTasks = (state) => {
+  const list = byId("task-values"), values = state.taskValues();
+  list.hidden = !values.length;
+  values.forEach(({ F, best }, k) => {
+    const { name, sense, F_unit } = state.data.tasks[k], row = list.children[k] ?? list.appendChild(make("li", {}));
+    const part = best ? `${digits((100 * F) / best, 4)} % of ` : "";
+    say(row, `${name}: F = ${measured(F, F_unit)}${best === null ? "" : `, ${part}the separate ${sense}imum ${digits(best)}`}`);
+  });
+};
+
 /**
  * Headline, and the values of the point.
  * @param {State} state
@@ -128,6 +139,7 @@ export const showValues = (state, limits, own) => {
   say(byId("F"), own?.value ?? `${extreme}${data.F_name} = ${measured(value, data.F_unit)}`);
   say(byId("word"), word);
   say(byId("words"), words + (violated ? `; ${violated} limit${violated > 1 ? "s" : ""} violated` : ""));
+  showTasks(state);
   byId("answer").classList.toggle("none", isFault || violated > 0);
   byId("answer").classList.toggle("proved", own ? own.isProgram : state.kind === "program");
   byId("stated-task").hidden = !own && state.hasOtherTask();
