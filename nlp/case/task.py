@@ -103,7 +103,9 @@ class Task:
             name: name of the task.
             weight: positive weight of the task in a combination of several tasks.
         """
-        return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense(sense), name, weight, follows=motion)
+        # The kind of the placeholder, a rotation or a translation, determines the unit of F.
+        twist = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0) if motion == "tool" else (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return cls(twist, Sense(sense), name, weight, follows=motion)
 
     @classmethod
     def screw(

@@ -15,11 +15,13 @@ class ConstantSettingData(JsonObject):
     Attributes:
         values: value of each setting.
         value: objective with these values.
+        design: values of the free dimensions of the design with these values.
         gain: relative gain of the schedule over these values; 0 for a gain below 1e-6.
     """
 
     values: Vector
     value: float
+    design: Mapping[str, float]
     gain: float
 
 
@@ -92,7 +94,9 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         design=schedule.design,
         constant=None
         if constant is None
-        else ConstantSettingData(values=vector(constant.values), value=constant.value, gain=schedule.gain or 0.0),
+        else ConstantSettingData(
+            values=vector(constant.values), value=constant.value, design=constant.design, gain=schedule.gain or 0.0
+        ),
         rates=tuple(
             RateData(used=finite_or_none(used), max=finite_or_none(most))
             for used, most in zip(schedule.rates_used.tolist(), schedule.rates.tolist(), strict=True)

@@ -20,7 +20,7 @@ import numpy as np
 from casadi import SX
 
 from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, homogenised, instantiate
-from ....models.joints.model.closedform import closed_form
+from ....models.joints.model.closedform import closed_form, eliminated_form
 from ....models.rotation import matrix_from_axis_angle
 from ....models.statics import posed_statics
 from ....models.values import dataclass
@@ -35,10 +35,14 @@ from ...case.pose import Free, OverPoses
 from ...case.task import LEG_LENGTH, SMALLEST, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
+from ...path.settings import changing_of
 from ...path.waypoints import Waypoints, waypoints
 from ...program.actuators import signed_values
 from ...program.layout import reference_of
+from ...proof.statement.fixed_robot import check_moving
 
+#: First words of the name of a limb's reach among the limits.
+REACH = "reach limb "
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
 #: Number of mapped functions that are kept: their construction takes longer than a call with few points.
@@ -47,6 +51,11 @@ _MAPS = 4
 INSIDE = 1e-9
 #: Rounding of a difference of two settings, relative to the largest setting.
 _ROUNDING = 2.0**-50
+#: Largest residual of closed loops, which have magnitudes of about 1. At the edge of the reach it is as large as the
+#: excess over a limit that counts as rounding.
+_CLOSED = 1e-6
+#: Number of designs and settings at which loops are tested along the path.
+_TESTED, _SEED = 12, 0
 
 
 class _Stated(NamedTuple):
@@ -111,6 +120,7 @@ class ScheduleProblem:
         objective: (T, 1) signed objectives.
         limits: (c, 1) limits as expressions that must be at most 0.
         of_design: (b, 1) limits of the design alone, at most 0.
+        loops: (e, 1) left sides of the loop equations, scaled to values of about 1; 0 at poses that the robot can take.
         names: names of the limits.
         lengths: (l, 1) values at a point of which a limit compares the smallest with the largest one, such as a stroke.
         extents: limits on each of these values.
@@ -128,6 +138,7 @@ class ScheduleProblem:
     objective: SX
     limits: SX
     of_design: SX
+    loops: SX
     names: tuple[str, ...]
     lengths: SX
     extents: tuple[tuple[Extent, ...], ...]
@@ -234,7 +245,7 @@ class ScheduleProblem:
             d: (n,) design.
             s: (N, k) settings.
             which: indices of the points; all if left out.
-            estimated: If true, return the smooth estimate of the smallest singular value, which is not above it.
+            estimated: If true, the smallest singular value is the smooth estimate of the program, not above it.
         """
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
@@ -246,6 +257,14 @@ class ScheduleProblem:
             values = np.full((count, 1), math.nan)
             values[regular] = np.linalg.svd(matrices[regular], compute_uv=False)[:, -1:]
         return Values(values, limits.full().T)
+
+    def gaps(self, d: FloatArray, s: FloatArray) -> FloatArray:
+        """Return the largest residual (N,) of the loop equations at the points, for a design (n,) and settings."""
+        function = ca.Function("loops", list(self.symbols), [ca.densify(self.loops)])
+        count = len(self.points)
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        found = function.map(count)(design, np.reshape(s, (count, -1)).T, self.numbers)
+        return np.asarray(np.abs(found.full()).max(axis=0, initial=0.0))
 
     def combined(self, objective: FloatArray) -> FloatArray:
         """Return the value of each point from its objectives (..., T): their sum, or the worst."""
@@ -270,6 +289,7 @@ class ScheduleProblem:
         return bool(
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
+            and (self.gaps(d, s) <= _CLOSED).all()
             and (own <= slack).all()
             and self.extent_excess(d, s) <= slack
             and (s >= low - rounding).all()
@@ -298,14 +318,17 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
+    if case.limits_over:
+        check_moving(case, tuple(changing_of(case).own.values()))
     points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
+    if closed.model.unknowns:
+        closed = eliminated_form(case.model)
     model = closed.model
     if model.unknowns:
-        fault = (
-            f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
-        )
+        names = ", ".join(each.description or each.name for each in model.unknowns)
+        fault = f"is not supported along a path for {case.model.name!r}: no closed form of {names}"
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
@@ -330,15 +353,16 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     ]  # fmt: skip
     for reach in closed.reaches:
         value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
-        stated.append(_Stated(f"reach limb {reach.limb}", value, 0.0, math.inf, NUMBER))
+        stated.append(_Stated(f"{REACH}{reach.limb}", value, 0.0, math.inf, NUMBER))
     rows = [row for each in stated for row in _rows(each, case.characteristic_length)]
+    rows = [row for row in rows if not _is_bound(row.excess, d, s, [*design, *settings])]
     varying = [bool(ca.depends_on(row.excess, ca.vertcat(s, point))) for row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
     lengths, extents = _extents(case, robot)
     matrix = _matrix(case, robot)
     values = _values(case, model, robot) if matrix is None else ca.sqrt(smallest_eigenvalue(matrix.T @ matrix))
     weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
-    return ScheduleProblem(
+    problem = ScheduleProblem(
         case=case,
         points=points,
         design=design,
@@ -348,12 +372,39 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         objective=case.tasks[0].sense.sign * values,
         limits=ca.vertcat(SX(0, 1), *[row.excess + point[15] for row in at_points]),
         of_design=ca.vertcat(SX(0, 1), *[row.excess for row, own in zip(rows, varying, strict=True) if not own]),
+        loops=robot.loops if model.loops else robot.closure,
         names=tuple(row.name for row in at_points),
         lengths=lengths,
         extents=extents,
         are_exact=tuple(row.is_exact for row in at_points),
         matrix=matrix,
     )
+    _check_poses(problem)
+    return problem
+
+
+def _check_poses(problem: ScheduleProblem) -> None:
+    """Refuse a path with a pose that the robot takes with no tested design and settings within its reach.
+
+    Raises:
+        CaseError: the loop equations exclude a pose.
+    """
+    count, (low, high, first) = len(problem.points), ends([*problem.design, *problem.settings])
+    if not problem.loops.numel():
+        return
+    rng, n = np.random.default_rng(_SEED), len(problem.design)
+    reach = [k for k, name in enumerate(problem.names) if name.startswith(REACH)]
+    least, within = np.full(count, math.inf), np.zeros(count, dtype=bool)
+    for values in (first, *(rng.uniform(low, high) for _ in range(_TESTED))):
+        d, s = values[:n], np.repeat(values[None, n:], count, axis=0)
+        is_within = (problem.at(d, s).excess[:, reach] <= 0).all(axis=1)
+        least[is_within] = np.minimum(least, problem.gaps(d, s))[is_within]
+        within |= is_within
+    wrong = np.flatnonzero(within & ~(least <= _CLOSED))
+    if len(wrong):
+        x, y, z = problem.points.positions[wrong[0]].tolist()
+        fault = f"{problem.case.model.name!r} cannot take the pose at ({x:.7g}, {y:.7g}, {z:.7g}): its joints constrain"
+        raise CaseError("path.file", f"{fault} the platform to other poses", source=problem.case.source)
 
 
 def _check_times(case: Case, points: Waypoints) -> None:
@@ -481,3 +532,24 @@ def _rows(stated: _Stated, length: float) -> Iterator[_Row]:
         yield _Row(name, (expression - upper) / reading.size(upper, length), is_exact)
     if math.isfinite(lower):
         yield _Row(name, (lower - expression) / reading.size(lower, length), is_exact)
+
+
+def _is_bound(row: SX, d: SX, s: SX, variables: Sequence[Variable]) -> bool:
+    """Return whether a row ``row <= 0`` holds within the range of its only variable, as the limit on a joint does.
+
+    Args:
+        row: (1, 1) row.
+        d: (n, 1) symbols of the design.
+        s: (k, 1) symbols of the settings.
+        variables: variables of both.
+    """
+    symbols = ca.vertcat(d, s)
+    own = ca.symvar(row)
+    hashes = [each.element_hash() for each in ca.vertsplit(symbols)] if symbols.numel() else []
+    if len(own) != 1 or own[0].element_hash() not in hashes:
+        return False
+    variable = variables[hashes.index(own[0].element_hash())]
+    if ca.depends_on(ca.jacobian(row, own[0]), own[0]):
+        return False
+    ends_of_row = ca.Function("row", own, [row]).map(2)([variable.lower, variable.upper]).full()
+    return bool((ends_of_row <= _ROUNDING).all())
