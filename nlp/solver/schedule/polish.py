@@ -168,7 +168,7 @@ def _extent_rows(
     smallest, largest = extents[:half], extents[half:]
     rows = [ca.vec(ca.repmat(smallest, 1, count) - lengths), ca.vec(lengths - ca.repmat(largest, 1, count))]
     rows += [
-        (size[j] * (largest[j] - each.ratio * smallest[j]) - each.most) / abs(each.most)
+        (size[j] * (largest[j] - each.ratio * smallest[j]) - each.most) / abs(each.most) + problem.extent_margin
         for j, own in enumerate(problem.extents)
         for each in own
     ]

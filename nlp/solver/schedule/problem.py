@@ -127,6 +127,7 @@ class ScheduleProblem:
         are_exact: (c,) whether each limit is on the quantity of the case; false for a limit on a stricter estimate.
         matrix: (m, 6) homogenised J, if its smallest singular value is the objective; otherwise None.
         margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
+        extent_margin: margin by which limits that compare points are tighter, relative to their sizes.
     """
 
     case: Case
@@ -145,6 +146,7 @@ class ScheduleProblem:
     are_exact: tuple[bool, ...]
     matrix: SX | None = None
     margins: FloatArray | None = None
+    extent_margin: float = 0.0
 
     @property
     def sign(self) -> float:
@@ -228,7 +230,7 @@ class ScheduleProblem:
             return -math.inf
         lengths = self.compared(d, s)
         excess = [
-            (largest - each.ratio * smallest - each.most) / abs(each.most)
+            (largest - each.ratio * smallest - each.most) / abs(each.most) + self.extent_margin
             for own, smallest, largest in zip(
                 self.extents, lengths.min(axis=0).tolist(), lengths.max(axis=0).tolist(), strict=True
             )
