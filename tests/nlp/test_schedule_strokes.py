@@ -50,12 +50,12 @@ def test_a_schedule_keeps_a_stroke_and_a_dead_length(tmp_path: Path) -> None:
 
 def test_a_stroke_is_proved_along_the_whole_path(tmp_path: Path) -> None:
     # A stroke that is exactly reached at the points cannot be proved, so the schedule keeps a margin.
-    whole = ("[limits]", '[limits]\nover = "path"\nactuator = { stroke_max = 15.5 }')
+    whole = ("[limits]", '[limits]\nover = "path"\nactuator = { stroke_max = 14.2 }')
     found = solve(load_case(str(_written(tmp_path, _FREE, whole, count=8)))).schedule
     assert found is not None
     assert found.judgement is not None
     assert found.judgement.is_proved
-    assert np.ptp(_lengths(found), axis=0).max() <= 15.5
+    assert np.ptp(_lengths(found), axis=0).max() <= 14.2
 
 
 def test_a_stroke_that_no_schedule_keeps_is_not_converged(tmp_path: Path, cli: Run) -> None:
