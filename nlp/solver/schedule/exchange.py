@@ -68,9 +68,11 @@ def exchanged(problem: ScheduleProblem, schedule: Polished) -> ProvedSchedule:
     for _ in range(_MOST):
         added = len(problem.points) - first
         places = [] if judged.is_proved or is_requested() else _places(problem, schedule, judged)
-        finer, own = _with_points(problem, path, schedule, places) if places else (_tighter(problem), schedule.s)
-        if finer is None or judged.is_proved or is_requested():
+        tighter = _tighter(problem, judged)
+        if judged.is_proved or is_requested() or not (places or tighter > problem.extent_margin):
             return ProvedSchedule(problem, schedule, judged, added)
+        finer, own = _with_points(problem, path, schedule, places) if places else (problem, schedule.s)
+        finer = replace(finer, extent_margin=tighter)
         found = polish(finer, schedule.d, own)
         if found is None:
             return ProvedSchedule(problem, schedule, judged, added)
@@ -97,11 +99,13 @@ def _with_points(
     return refined, within_rates(refined, own)
 
 
-def _tighter(problem: ScheduleProblem) -> ScheduleProblem | None:
-    """Return the problem with a larger margin of its strokes, which have no place on the path; None at the largest."""
-    if not problem.extents or problem.extent_margin >= _LARGEST:
-        return None
-    return replace(problem, extent_margin=max(2 * problem.extent_margin, _MARGIN))
+def _tighter(problem: ScheduleProblem, judged: Judgement) -> float:
+    """Return the margin of strokes after a proof: larger, up to a largest one, if a stroke failed or is undecided."""
+    names = {each.name for own in problem.extents for each in own}
+    failed = any(each.claim.name in names and each.fails for each in judged.verdicts)
+    if not failed or problem.extent_margin >= _LARGEST:
+        return problem.extent_margin
+    return max(2 * problem.extent_margin, _MARGIN)
 
 
 def _judged(problem: ScheduleProblem, schedule: Polished, path: ProgrammedPath) -> Judgement:
