@@ -237,7 +237,7 @@ class Case(Whole, Shown):
 
     @property
     def dimensions_per_task(self) -> Mapping[str, PerTask]:
-        """Components of the robot's parameters that are set anew for every task, by their name in the robot."""
+        """Components of the robot's parameters that are reset for every task, by their name in the robot."""
         return {
             name: value
             for item in self.model.parameters

@@ -12,10 +12,10 @@ from ...models import Model, frozen_array
 from ...models.statics import driven_joints
 from ..errors import CaseError, listing
 from ..units import Units
-from .checks import check_real, check_reals, check_statics, check_vector
+from .checks import check_real, check_reals, check_size, check_statics, check_vector
 from .loads import Loading
 from .pose import LARGEST
-from .task import MEASURES, Sense, Task
+from .task import ALONG, MEASURES, SMALLEST, Sense, Task
 
 
 def check_tasks(given: Sequence[Task], model: Model, loading: Loading) -> tuple[Task, ...]:

@@ -39,10 +39,14 @@ def view(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     target = str(Path(tempfile.mkdtemp(prefix="screwsynth.")) / "view.html") if out is None else out
     check_outputs(inputs, {"--out": target})
+    remark = ""
     if loaded.over_path is not None:
         from ..output.live.schedule import schedule_page
+        from ..words.schedule import no_schedule_line
 
-        page = schedule_page(solve_with_progress(loaded, jobs).solution, case)
+        solved = solve_with_progress(loaded, jobs).solution
+        page = schedule_page(solved, case)
+        remark = "" if solved.schedule is not None else no_schedule_line(loaded).words
     else:
         source = view_or_drawing(loaded)
         solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
@@ -51,6 +55,8 @@ def view(
     if target != "-":
         words = f"{one_line(target)}: {len(page.text.encode()) / 1000:.0f} kB"
         print_line(f"{words}; the sliders do not work: {page.fault}" if page.fault else words)
+        if remark:
+            print_line(remark)
     if not no_open and target != "-":
         import webbrowser
 

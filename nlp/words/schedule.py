@@ -116,7 +116,7 @@ def gain_words(schedule: ScheduleData) -> str:
     if schedule.constant is None:
         return f"no constant {names} keeps the limits"
     gain = schedule.constant.gain
-    return f"{_signed(schedule, gain) if gain else 'no gain'} over the best constant {names}"
+    return f"{_signed(schedule, gain) if gain else 'no gain'} compared with the best constant {names}"
 
 
 def _gain(schedule: ScheduleData) -> str:

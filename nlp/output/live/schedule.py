@@ -27,7 +27,7 @@ from ...view.source import view_or_drawing
 from ...words.numbers import number
 from ...words.schedule import gain_words, no_schedule_line, objective_name, schedule_lines, schedule_task_lines
 from .page import LivePage, LiveParts, Track, live_page, live_parts
-from .posing import HALF_TURN, pose_places, with_free_pose
+from .posing import pose_places, with_free_pose
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Largest number of points of a page, and of columns and rows of a map.
 _POINTS, _COLUMNS, _ROWS = 1000, 200, 160
+#: Number of turns about the tool at which rotations are compared.
+_TURNS = 61
 #: Largest size of the packed table of the schedule, characters.
 _TABLE = 400_000
 #: Value of a map where a limit is violated, and the values of the smallest and the largest objective.
@@ -128,8 +130,22 @@ def _case_along(along: _Along) -> Case:
         names = start.component_names(item)
         values = [settings.get(name, value) for name, value in zip(names, start.components(item.name), strict=True)]
         parameters[item.name] = values if len(values) > 1 else values[0]
-    size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions"))
-    return with_free_pose(replace(start, parameters=parameters), problem.points.positions, HALF_TURN, size)
+    size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions").tolist())
+    # The page evaluates points of the path, and needs no optimum of the pose.
+    posed = replace(start, parameters=parameters, search=start.search.but(1, None))
+    return with_free_pose(posed, problem.points.positions, _largest_turn(along), size)
+
+
+def _largest_turn(along: _Along) -> float:
+    """Return the largest rotation of the platform along the path, radians, over the whole range of its turn."""
+    q, path = along.schedule.quaternions, along.problem.case.path
+    if path is None or path.tool is None:
+        return float(2 * np.arccos(np.clip(np.abs(q[:, 0]), 0.0, 1.0)).max())
+    turn, axis = path.tool.turn, np.array(path.tool.axis) / np.linalg.norm(path.tool.axis)
+    low, high = (turn.lower, turn.upper) if isinstance(turn, Free) else (turn, turn)
+    half = 0.5 * np.linspace(low, high, _TURNS)
+    real = np.outer(q[:, 0], np.cos(half)) - np.outer(q[:, 1:] @ axis, np.sin(half))
+    return float(2 * np.arccos(np.clip(np.abs(real), 0.0, 1.0)).max())
 
 
 def _track(solution: Solution, along: _Along, nlp: Nlp) -> Track:
@@ -161,13 +177,13 @@ def _track(solution: Solution, along: _Along, nlp: Nlp) -> Track:
     data = {
         "places": places,
         "frames": frames,
-        "panels": [],
         "path": positions[along.shown].tolist(),
         "nearest": [-1] * count,
         "margins": [None] * count,
         "limits": [],
         "most": 1,
         "marks": [],
+        "panels": [],
         "first": 0,
         "schedule": _schedule_data(solution, along, nlp, settings),
     }
@@ -215,6 +231,7 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
         "follows": [each.follows for each in case.tasks],
         "weights": [each.weight for each in case.tasks],
         "measure": case.tasks[0].measure,
+        "length": case.tasks[0].length or 1.0,
         "isWorst": case.over_path is OverPoses.WORST,
         "sign": schedule.sign,
         "unit": unit_of_objective(case),
@@ -223,6 +240,7 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
         "name": objective_name(case),
         **_texts(solution, schedule),
         "maps": [_map(along, k) for k in range(len(problem.settings))],
+        "hasSlopes": len(case.tasks) == 1 and not case.tasks[0].measure,
         "table": table if len(table) <= _TABLE else None,
     }
 

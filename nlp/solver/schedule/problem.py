@@ -35,9 +35,11 @@ from ...case.pose import Free, OverPoses
 from ...case.task import LEG_LENGTH, SMALLEST, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
+from ...path.settings import changing_of
 from ...path.waypoints import Waypoints, waypoints
 from ...program.actuators import signed_values
 from ...program.layout import reference_of
+from ...proof.statement.fixed_robot import check_moving
 
 #: First words of the name of a limb's reach among the limits.
 REACH = "reach limb "
@@ -207,7 +209,7 @@ class ScheduleProblem:
             d: (n,) design.
             s: (N, k) settings.
             which: indices of the points; all if left out.
-            estimated: If true, the smallest singular value is the smooth estimate of the program, which is not above it.
+            estimated: If true, the smallest singular value is the smooth estimate of the program, not above it.
         """
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
@@ -279,6 +281,8 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
+    if case.limits_over:
+        check_moving(case, tuple(changing_of(case).own.values()))
     points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)

@@ -14,7 +14,7 @@ import { unpack } from "./text.js";
  * @typedef {Told & { isFault: boolean, isProgram: boolean }} Headline
  * @typedef {{ settings: Setting[], rows: number[][], reach: [number, number][][], step: (number | null)[][], rates: (number | null)[][],
  *   F: number[], value: number, constant: { row: number[], design: number[], F: number[], value: number } | null, design: { places: number[], values: number[] },
- *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, isWorst: boolean, sign: number,
+ *   feeds: Vector[], axis: Vector | null, turn: number, follows: string[], weights: number[], measure: string, length: number, hasSlopes: boolean, isWorst: boolean, sign: number,
  *   unit: string, isTimed: boolean, isAnswer: boolean, name: string, schedule: Told, held: Told | null, maps: MapData[],
  *   table: string | null }} ScheduleData rows, reach and step in units of computations; turn is that of a tool without a setting
  */
@@ -65,6 +65,8 @@ export class Schedule {
     this.moved = null;
     this.isCase = true;
     document.documentElement.classList.add("on-schedule");
+    // Slopes of the module are those of one task without its weight.
+    if (!data.hasSlopes) state.data.has_slopes = false;
     this.addTravel();
     this.addControls(copy);
     this.addMaps();
@@ -104,7 +106,7 @@ export class Schedule {
     const button = make("button", { type: "button", id: "copy-schedule" }, "Copy schedule");
     button.hidden = !data.table;
     button.addEventListener("click", async () => copy(new TextDecoder().decode(await unpack(data.table ?? "")), "Schedule, as --schedule writes it"));
-    const words = `The program computed the first ${data.constant ? "two rows" : "row"}. ${data.table ? "Copy schedule has the columns of --schedule" : "The schedule is too large for a copy: solve --schedule FILE writes it"}. No --set option states a point of the path; Copy case file has the robot at this point, for evaluate.`;
+    const words = `The program computed the first ${data.constant ? "two rows" : "row"}. ${data.table ? "Copy schedule has the columns of --schedule" : "The schedule is too large for a copy: solve --schedule FILE writes it"}. No --set option states a point of the path${this.state.data.case_parts.length ? "; Copy case file has the robot at this point, for evaluate" : ""}.`;
     const section = make("section", { id: "schedule" }, make("h2", {}, "Settings at this point"), make("div", { class: "controls" }, ...this.choices, button),
       ...this.rows.flatMap((each) => [each.element, each.note]), make("div", { class: "scroll" }, table), make("p", { class: "note" }, words));
     byId("mode-solve").parentElement?.before(section);
@@ -212,6 +214,7 @@ export class Schedule {
       const terms = block("F").map((each, k) => each * data.weights[k]);
       return data.isWorst ? (data.sign > 0 ? Math.min(...terms) : Math.max(...terms)) : terms.reduce((sum, each) => sum + each, 0);
     }
+    if (data.measure === "smallest_singular_value") return state.module.smallestSingularValue(data.length);
     if (data.measure === "leg_length") {
       const at = state.data.quantities.findIndex((/** @type {any} */ each) => each.name === "leg_length");
       if (at < 0) return NaN;
@@ -227,7 +230,13 @@ export class Schedule {
   /** Whether everything is as the program found it. */
   isProgram() {
     const { state } = this, { limits } = state.module.arrays;
-    return !this.moved && this.isCase && state.limits.every((each, k) => limits[k] === each.value);
+    return !this.movedNames().length && this.isCase && state.limits.every((each, k) => limits[k] === each.value);
+  }
+
+  /** Names of the settings that were moved away from those of the program. */
+  movedNames() {
+    const own = this.own(this.index), { moved } = this;
+    return this.data.settings.filter(({ low, high }, k) => moved && Math.abs(moved[k] - own[k]) > SAME * (high - low)).map((each) => each.name);
   }
 
   /** Range of a setting that its rate reaches from both neighbours, in units of computations; null without a rate. @param {number} k @returns {[number, number] | null} */
@@ -248,7 +257,7 @@ export class Schedule {
     if (!reach) return { words: `${now}${most}`, isOut: false };
     const value = this.values()[k], slack = SAME * (high - low), isOut = value < reach[0] - slack || value > reach[1] + slack;
     const range = `${digits(reach[0] * factor, 5)} to ${measured(reach[1] * factor, unit, 5)}`;
-    if (!this.moved || value === this.own(index)[k]) return { words: `${now}${most}; reachable from the neighbouring points: ${range}`, isOut: false };
+    if (!this.movedNames().includes(name)) return { words: `${now}${most}; reachable from the neighbouring points: ${range}`, isOut: false };
     return { words: `${name} is ${isOut ? "outside" : "within"} ${range}, the range that its rate reaches from the neighbouring points (${most})`, isOut };
   }
 
@@ -256,12 +265,13 @@ export class Schedule {
   headline() {
     const { state, data } = this, told = this.isConstant && data.held ? data.held : data.schedule;
     if (state.fault & 1 || state.kind === "none") return { value: this.pointName(), word: "no robot", words: "The robot has no configuration at these values.", isFault: true, isProgram: false };
-    if (this.isProgram()) return { ...told, isFault: !data.isAnswer, isProgram: data.isAnswer };
-    const own = this.own(this.index), { moved } = this;
-    const names = data.settings.filter((_, k) => moved && moved[k] !== own[k]).map((each) => each.name);
+    // Texts of the program get the minus signs of the page.
+    const proper = (/** @type {string} */ text) => text.replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
+    if (this.isProgram()) return { value: proper(told.value), word: told.word, words: proper(told.words), isFault: !data.isAnswer, isProgram: data.isAnswer };
+    const names = this.movedNames();
     if (!this.isCase) names.push("dimensions");
     if (state.limits.some((each, k) => state.module.arrays.limits[k] !== each.value)) names.push("limits");
-    const isOut = Boolean(moved) && data.settings.some((_, k) => this.rateWords(k).isOut);
+    const isOut = data.settings.some((_, k) => this.rateWords(k).isOut);
     const words = `computed in this page at this point, with other ${names.join(", ")} than the ${this.isConstant ? "best constant" : "schedule"}${isOut ? "; the rate does not reach it from the neighbouring points" : ""}`;
     return { value: `${this.pointName()} = ${measured(this.value(), data.unit)}`, word: "point", words, isFault: false, isProgram: false };
   }
@@ -270,7 +280,7 @@ export class Schedule {
   refresh(isCase) {
     this.isCase = isCase;
     const { data, index } = this, now = this.values();
-    this.choices?.forEach((button, k) => button.setAttribute("aria-pressed", String((k === 1) === this.isConstant && !this.moved)));
+    this.choices?.forEach((button, k) => button.setAttribute("aria-pressed", String((k === 1) === this.isConstant && !this.movedNames().length)));
     this.rows?.forEach(({ range, entry, note }, k) => {
       const { unit, factor } = data.settings[k], value = now[k] * factor, text = digits(value), { words, isOut } = this.rateWords(k);
       if (Math.abs(Number(range.value) - value) > SAME * Math.abs(value)) range.value = String(value);
@@ -371,9 +381,9 @@ export class Schedule {
   fragment() {
     const { state, data } = this, parts = new URLSearchParams({ point: String(this.index + 1) }), stated = this.stated();
     if (this.isConstant) parts.set("shown", "constant");
-    const own = this.own(this.index), { moved } = this;
+    const now = this.values(), moved = this.movedNames();
     data.settings.forEach(({ name, factor }, k) => {
-      if (moved && moved[k] !== own[k]) parts.set(name, String(moved[k] * factor));
+      if (moved.includes(name)) parts.set(name, String(now[k] * factor));
     });
     for (const each of state.sliders) if (each.group === "dimension" && each.vector === "p" && state.module.arrays.p[each.index] !== stated[each.index]) parts.set(each.name, String(state.read(each)));
     state.limits.forEach((limit, k) => {

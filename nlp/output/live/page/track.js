@@ -77,8 +77,7 @@ export class Track {
     reset.addEventListener("click", () => change(() => this.reset()));
     byId("mode-solve").parentElement?.append(reset);
     const note = byId("controls").querySelector(".needs-module > .note");
-    const what = this.schedule ? "The pose is that of the path and the settings." : "The pose is that of the path.";
-    if (note) note.textContent = `${what} Limits, F and the table are computed in this page at this pose.`;
+    if (note) note.textContent = this.schedule ? "Limits, forces and the last row are computed in this page at this point." : "The pose is that of the path. Limits, F and the table are computed in this page at this pose.";
     this.addBars();
     this.move(this.index);
   }
