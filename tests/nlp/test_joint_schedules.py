@@ -111,16 +111,26 @@ def elbow(limb: int, rail: Array, position: Array) -> tuple[Array, Array, Array]
     """Return the centres (..., 2) of crank, elbow and platform joint, with the elbow on the side of home."""
     base = turned(limb, (2.0, 0.0)) + rail[..., None] * turned(limb, (0.0, 1.0))
     end = position + turned(limb, (0.4, 0.2))
+    return base, bent(base, end), end
+
+
+def bent(base: Array, end: Array) -> Array:
+    """Return the elbow (..., 2) between the centres of crank and platform joint, on the side of home."""
     way = end - base
     apart = np.linalg.norm(way, axis=-1, keepdims=True)
     along = (CRANK**2 - ROD**2 + apart**2) / (2 * apart)
     across = np.stack([way[..., 1], -way[..., 0]], axis=-1) / apart
-    return base, base + along * way / apart + np.sqrt(CRANK**2 - along**2) * across, end
+    return np.asarray(base + along * way / apart + np.sqrt(CRANK**2 - along**2) * across)
 
 
 def work(limb: int, rail: Array, position: Array, feed: Array) -> Array:
     """Return the squared work rate (...) of a rod of unit force: its change of length with locked rail and crank."""
     _, at, end = elbow(limb, rail, position)
+    return stretched(at, end, feed)
+
+
+def stretched(at: Array, end: Array, feed: Array) -> Array:
+    """Return the squared change of length (...) of a rod from an elbow at rest to a joint that moves along the feed."""
     step = 1e-6
     lengths = [np.linalg.norm(end + sign * step * feed - at, axis=-1) for sign in (1, -1)]
     return np.asarray(((lengths[0] - lengths[1]) / (2 * step)) ** 2)
@@ -238,6 +248,30 @@ def test_an_altered_schedule_is_refused_or_refuted(folder: Path, cli: Run) -> No
     assert code == 1
     assert "joint.1:2" in out
     assert cli("path", file, "--along", good)[0] == 0
+
+
+def test_a_driven_arm_is_a_setting_in_degrees(tmp_path: Path) -> None:
+    """In place of a rail, the base of the crank is on a driven arm of 0.316 m."""
+    circle(tmp_path, 12)
+    arm = '{ type = "R", name = "arm", at = [2.3, 0.1, 0], axis = "z", actuated = true }'
+    text = robot_text()
+    rail = next(line for line in text.splitlines() if '"rail", at' in line)
+    saved(tmp_path / "robot.toml", text.replace(rail, f"    {arm},"))
+    limits = 'arm = { min = -40, max = 40, per = "path", rate = 15 }'
+    schedule = solve(load_case(str(saved(tmp_path / "case.toml", case_text(limits))))).schedule
+    assert schedule is not None
+    assert schedule.rates.tolist() == pytest.approx([15.0])
+    points = Points(schedule)
+    assert (np.abs(np.diff(points.rails["joint.1:1"])) <= 15 * np.diff(points.times)).all()
+    centre, angle = np.array([2.3, 0.1]), np.radians(points.rails["joint.1:1"])
+    way = np.array([2.0, 0.0]) - centre
+    across = np.array([-way[1], way[0]])
+    base = centre + np.cos(angle)[:, None] * way + np.sin(angle)[:, None] * across
+    end = points.at + np.array([0.4, 0.2])
+    rest = sum(points.part(limb, np.zeros(len(angle))) for limb in (1, 2))
+    np.testing.assert_allclose(schedule.F, stretched(bent(base, end), end, points.feed) + rest, rtol=1e-8)
+    assert schedule.gain is not None
+    assert schedule.gain > 0.01
 
 
 def test_three_rails_move_as_each_one_alone(tmp_path: Path) -> None:
