@@ -417,6 +417,14 @@ def test_other_commands_and_poses_are_refused(tmp_path: Path, cli: Run) -> None:
     refusal_of(cli("solve", file), "path.file", "cannot take the pose at (0.0005, 0, 0.0005)")
 
 
+def test_joints_without_closed_forms_are_named(tmp_path: Path, cli: Run) -> None:
+    saved(tmp_path / "path.csv", "t,x,y,z\n0,0,0,0\n1,0,0,0.01\n")
+    text = case_text("", task="axis = [0, 0, 1]\npitch = inf").replace(
+        'file = "robot.toml"', 'model = "differential-waist", parameters = { ratio = 0.55, spread = 0.05 }'
+    )
+    refusal_of(cli("solve", str(saved(tmp_path / "case.toml", text))), "no closed form of the passive joints of limb 1")
+
+
 def test_limits_of_python(tmp_path: Path) -> None:
     circle(tmp_path, 4)
     case = load_case(planar(tmp_path, case_text(f"rail = {MOVING}")))
