@@ -283,7 +283,7 @@ class RobotFunctions:
             listed = Quantity("every unknown", self.joints, all_of_them, Dimension.NUMBER, "of joints")
             model = replace(model, quantities=(*model.quantities, listed))
         at_home = with_joints_at_home(model)
-        kept = tuple(each for each in at_home.actuators if each.joint not in model.free_joints)
+        kept = tuple(each for each in at_home.actuators if each.joint not in model.undetermined)
         self.model = closed_form(replace(at_home, actuators=kept)).model
         own, pose = self.model.unknowns, SX.sym("pose", POSE)
         if own and changing:

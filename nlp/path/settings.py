@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.model import joint_parameter
 from ..case.pathfile import TURN
 from ..case.pose import Free
-from ..case.task import LEG_LENGTH, Task
+from ..case.task import ALONG, Task
 from ..errors import InputError
 from ..units import Units
 
@@ -92,6 +93,7 @@ class Changing:
         own: name of each dimension in the robot, by name of its column.
         dimensions: dimension of each setting.
         fixed: names of columns of quantities that the case fixes.
+        joints: names of the columns of actuated joints.
     """
 
     axis: FloatArray | None
@@ -100,6 +102,7 @@ class Changing:
     own: Mapping[str, str]
     dimensions: Mapping[str, Dimension]
     fixed: tuple[str, ...]
+    joints: tuple[str, ...] = ()
 
     @property
     def unread(self) -> Changing:
@@ -200,7 +203,7 @@ def case_along(case: Case, settings: Settings) -> Case:
                 low, high = float(own.min()), float(own.max())
                 values[k] = Free(low, high) if low < high else low
         parameters[item.name] = values if len(values) > 1 else values[0]
-    stated = tuple(task for task in case.tasks if not (task.follows or task.measure == LEG_LENGTH))
+    stated = tuple(task for task in case.tasks if not (task.follows or task.measure in ALONG))
     tasks = stated or (replace(Task.translation((0.0, 0.0, 1.0)), is_stated=False),)
     return replace(case, parameters=parameters, tasks=tasks, over_path=None, path=None)
 
@@ -219,8 +222,9 @@ def changing_of(case: Case) -> Changing:
             else:
                 fixed.append(column)
     tool = None if case.path is None else case.path.tool
+    joints = tuple(map(joint_parameter, case.model.locked))
     if tool is None:
-        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed))
+        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed), joints)
     if TURN in ranges:
         dimensions[TURN] = Dimension.ANGLE
     else:
@@ -229,4 +233,4 @@ def changing_of(case: Case) -> Changing:
     axis = np.array(tool.axis, dtype=np.float64)
     # Division by the largest component first: squares neither overflow nor vanish.
     axis = axis / np.abs(axis).max()
-    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed))
+    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed), joints)

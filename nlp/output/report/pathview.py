@@ -14,6 +14,7 @@ from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
 from ..pictures.posture import Linkage, Posture
 from .frames import JointData, LinkData, PointData, first_eye, joint_data, link_data
+from .markup import with_signs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -182,7 +183,7 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
             f": {nearest} violated by {percent(-margin)}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
         )
     return {
-        "words": words,
+        "words": with_signs(words),
         "at": float(picture.at[k]),
         "position": _rounded(posture.position, size),
         "points": _rounded(posture.points, size),

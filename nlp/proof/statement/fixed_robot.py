@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, Model, frozen_array
+from ....models.model import joint_parameter
 from ...case.case import Case
 from ...case.checks import check_determined_joints
 from ...case.limits.joints import JointAngle, MountingPose
@@ -96,7 +97,8 @@ def check_moving(case: Case, names: Sequence[str]) -> None:
     if not names:
         return
     first = case.parameter_name(names[0])
-    if not has_straight_legs(case.model):
+    joints = [joint_parameter(label) for label in case.model.locked]
+    if not (has_straight_legs(case.model) or all(name in joints for name in names)):
         fault = f"{case.model.name} is not a robot with six straight legs, for which alone this is proved"
         raise CaseError(f"robot.parameters.{first}.per", f"{fault}; give the drive as a joint", "path", case.source)
     for limit in case.limits:
