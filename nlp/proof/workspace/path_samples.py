@@ -127,7 +127,7 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
         most: number of points to spread over the path.
     """
     path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
-    case = in_motion(case) if path.is_timed else case
+    case = in_motion(case) if path.is_timed and case.without_motion else case
     points = spread_points(path, most, [(each.segment, each.parameter) for each in places_of(judged)])
     poses = path.poses_at(*points)
     try:
