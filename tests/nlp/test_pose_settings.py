@@ -397,8 +397,8 @@ def test_altered_proofs_of_settings_are_rejected(name: str, change: dict[str, An
     case, proof = settings_of_cube().case, settings_proof_of(settings_of_cube(), "")
     (claim,) = proof.claims
     if "sides" in change:
-        rest = claim.sides[1:]
-        claim = replace(claim, sides=rest if change["sides"] is None else (change["sides"], *rest))
+        given = change["sides"]
+        claim = replace(claim, sides=claim.sides[:-1] if given is None else (given, *claim.sides[1:]))
     elif isinstance(change["tree"], slice):
         claim = replace(claim, tree=claim.tree[change["tree"]])
     else:
@@ -444,6 +444,8 @@ def test_a_limit_without_a_rule_of_the_checker_is_rejected() -> None:
     position = [each if isinstance(each, int | float) else each["min"] for each in tables["pose"]["position"]]
     tables["workspace"] = {"position": [{"min": c - 1, "max": c + 1} for c in position]}
     tables["limits"] = {"smallest_singular_value": {"min": 0.01, "length": 100}}
+    stated = tables["robot"]["parameters"]
+    stated |= {name: each["min"] for name, each in stated.items() if isinstance(each, dict)}
     case = case_from(tables, "delta")
     with pytest.raises(ProofError, match="no rule for smallest_singular_value"):
         BoxChecker(case, workspace_of_case(case))
