@@ -464,3 +464,24 @@ def test_the_example_of_the_page(tmp_path: Path) -> None:
     assert schedule.constant is not None
     value, constant = (f"{each:.7g}" for each in (schedule.value, schedule.constant.value))
     assert f"mean F = {value} along 192 segments (best constant joint.1:1 {constant}, " in part
+
+
+def test_proofs_and_pictures_along_a_table_with_a_rail(
+    tmp_path: Path, cli: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A table without rotations: the checker follows the loops with the rail as a further coordinate."""
+    monkeypatch.chdir(tmp_path)
+    circle(tmp_path)
+    file = planar(tmp_path, case_text(f"rail = {MOVING}"))
+    head, *rows = Path("path.csv").read_text().splitlines()
+    lines = [f"{row},{0.02 * float(row.split(',')[0])!r}" for row in rows[:6]]
+    saved(Path("rail.csv"), "\n".join([f"{head},joint.1:1", *lines, ""]))
+    options = ("--along", "rail.csv")
+    output_of(cli("path", file, *options, "--proof", "proof.json", "--plot", "path.svg"))
+    assert "PROOF VALID: 16 of 16 claims" in output_of(cli("verify-proof", "proof.json", file, *options))
+    assert 'id="rate of joint.1:1 joint.1:1"' in Path("path.svg").read_text()
+    # Another motion of the rail has other speeds.
+    faster = [f"{row},{0.05 * float(row.split(',')[0])!r}" for row in rows[:6]]
+    saved(Path("faster.csv"), "\n".join([f"{head},joint.1:1", *faster, ""]))
+    assert cli("verify-proof", "proof.json", file, "--along", "faster.csv")[0] == 1
+    refusal_of(cli("path", file, *options, "--csv", "joints.csv"), "joints of robot 'rails' have no closed form")

@@ -214,7 +214,8 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     names, strips = actuator_names(picture), dict[int, list[Curve]]()
     names = {each.place: "" for each in panel.curves} if panel.is_setting else names
     for each in panel.curves:
-        kind = f"curve a{each.place % count}{' other' * each.is_other}"
+        colour = "" if panel.is_setting else f" a{each.place % count}"
+        kind = f"curve{colour}{' other' * each.is_other}"
         strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
     ends = f"{every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else "no known value"
