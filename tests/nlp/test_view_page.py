@@ -195,7 +195,12 @@ HOSTILE = """
 title = "a</script><script>window.hacked=1</script>\\u2028'\\"<img src=x onerror=window.hacked=2>"
 units = { length = "cm" }
 pose = { position = [0, 0, { min = 15, max = 30 }] }
-task = [{ name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf }]
+task = [
+  { name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf },
+  { name = "<!-- ${x} \\\\ $title WWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWW", sense = "max", pitch = 0,
+    axis = [0, 0, 1], point = [0, 0, 0] },
+]
+combine = { method = "worst-case" }
 limits = { leg_length = { min = 2, max = 60 } }
 solve = { starts = 2 }
 [robot]
@@ -207,15 +212,18 @@ parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
 @needs_compiler
 @pytest.mark.browser
 def test_texts_of_a_case_stay_texts(live: Callable[..., Live], tmp_path: Path) -> None:
-    case = saved(tmp_path / "hostile.toml", HOSTILE)
-    page = live(str(case), fragment="#p_z=<img src=x>&x1=NaN&p_x=1e999&held=__proto__&mode=</script>")
+    case = saved(tmp_path / "a 'b' ${x} <!-- $title.toml", HOSTILE)
+    page = live(str(case), width=420, fragment="#p_z=<img src=x>&x1=NaN&p_x=1e999&held=__proto__&mode=</script>")
     assert page.chrome.execute_script("return [window.hacked, document.images.length]") == [None, 0]
     assert "</script><script>window.hacked=1</script>" in page.shown("answer")[0] + str(
         page.chrome.execute_script("return document.querySelector('h1').textContent")
     )
     assert page.shown("word") == ["optimal"]
     assert page.faults == []
-    html = Page((tmp_path / "hostile.html").read_text(encoding="utf-8"))
+    assert page.chrome.execute_script("return document.documentElement.scrollWidth") <= 420
+    assert [each[1][:12] for each in task_values(page)] == ["</script><b>", "<!-- ${x} \\ "]
+    assert shlex.split(page.copied("copy-set"))[2] == str(case)
+    html = Page(case.with_suffix(".html").read_text(encoding="utf-8"))
     assert len(html.scripts) == 3
 
 
@@ -495,7 +503,7 @@ model = "stewart-gough"
 parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = { min = 5, max = 28 } }
 """
 #: F of a task, and its separate optimum if it is known.
-TASK_VALUE = re.compile(r"^(.+): F = (\S+) \S+?(?:, (\S+) % of the separate (maximum|minimum) (\S+))?$")
+TASK_VALUE = re.compile(r"^(.+): F = (\S+) \S+?(?:, (\S+)\xa0% of the separate (maximum|minimum) (\S+))?$")
 
 
 def task_values(page: Live) -> list[re.Match[str]]:
@@ -537,6 +545,19 @@ def test_the_headline_has_each_task_as_a_part_of_its_own_optimum(
     fixed = page.chrome.execute_script("return screwsynth.state.isStatedCase()")
     assert [bool(each[5]) for each in task_values(page)] == [fixed, fixed]
     assert fixed is False
+    assert page.faults == []
+
+
+@needs_compiler
+@pytest.mark.browser
+def test_a_page_goes_on_where_the_robot_cannot_close(live: Callable[..., Live]) -> None:
+    page = live("five-bar")
+    page.click("mode-evaluate")
+    before = page.F
+    page.move("forearm", 0.125)
+    assert_words(" ".join(page.shown("F", "word", "words")), "no robot", "no configuration")
+    page.click("to-start")
+    assert pytest.approx(before, rel=1e-12) == page.F
     assert page.faults == []
 
 

@@ -258,7 +258,7 @@ def _task_words(task: OutcomeData, unit: str) -> str:
     words = f"{task.name}: F = {number(task.F)} {unit}".rstrip()
     if task.best is None:
         return words
-    part = f"{100 * task.F / task.best:.4g} % of " if task.best else ""
+    part = f"{100 * task.F / task.best:.4g}\N{NO-BREAK SPACE}% of " if task.best else ""
     return f"{words}, {part}the separate {task.sense.value}imum {number(task.best)}"
 
 
