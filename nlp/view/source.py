@@ -85,6 +85,14 @@ def view_without_solver(case: Case, error: CaseError) -> ViewSource:
     return ViewSource(subject, functions, {}, _reason(case, error))
 
 
+def view_or_drawing(case: Case) -> ViewSource:
+    """Return the C of the live view of a case; where C cannot be generated, the view without a module."""
+    try:
+        return view_source(case)
+    except CaseError as error:
+        return view_without_solver(case, error)
+
+
 def _reason(case: Case, error: CaseError) -> str:
     """Return the reason why C cannot be generated as a plain sentence, without keys of case files."""
     match error.key:

@@ -56,6 +56,7 @@ SCRIPTS = (
     "jumps.js",
     "map.js",
     "play.js",
+    "schedule.js",
     "track.js",
     "main.js",
 )
@@ -84,10 +85,16 @@ class Track:
     Attributes:
         x: (n,) variables at the first shown posture.
         data: data of the script: postures, path, violations, and curves at each posture.
+        names: settings that change along the path, whose sliders are those of the track.
+        answer: headline of the page before its script starts.
+        task: motions of the tasks in words.
     """
 
     x: FloatArray
     data: dict[str, Any]
+    names: tuple[str, ...] = ()
+    answer: str = ""
+    task: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +143,9 @@ class LiveParts:
     size: int
 
 
-def live_page(source: ViewSource, solution: Solution | None, command: str) -> LivePage:
+def live_page(source: ViewSource, solution: Solution | None, command: str, track: Track | None = None) -> LivePage:
     """Return the live page of a case; the arguments are those of :func:`live_parts`."""
-    parts = live_parts(source, solution, command)
+    parts = live_parts(source, solution, command, track)
     case = source.subject.nlp.case
     texts = {name: getattr(parts, name) for name in _PIECES}
     title = tag("title", f"{case.title or case.name} - screwsynth")
@@ -168,6 +175,9 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     if track is not None:
         # The range of rotations is only that of the path.
         data["rows"] = [each for each in data["rows"] if each["name"] != "angle"]
+        for slider in data["sliders"]:
+            if slider["name"] in track.names:
+                slider["group"] = "setting"
     page = {
         **data,
         "scene": _scene(drawing),
@@ -194,8 +204,8 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     return LiveParts(
         style=Markup(_file("live.css")),
         heading=tag("h1", title_line(case).words),
-        task=_task(case, solution),
-        answer=_answer_markup(answer) if answer is not None or module else _value_markup(nlp, x),
+        task=_task(case, solution) if track is None else _task_markup(track.task),
+        answer=_headline(nlp, x, answer, track, has_module=bool(module)),
         body=_body(case, data, drawing, fault),
         footer=_footer(source, module),
         data=script_json(page),
@@ -262,15 +272,25 @@ def _task_words(task: OutcomeData, unit: str) -> str:
     return f"{words}, {part}the separate {task.sense.value}imum {number(task.best)}"
 
 
-def _answer_markup(answer: dict[str, Any] | None) -> Markup:
-    """Return the content of the headline; the script fills it after a change."""
-    tasks = [] if answer is None else answer["tasks"]
+def _headline(
+    nlp: Nlp, x: FloatArray, answer: dict[str, Any] | None, track: Track | None, *, has_module: bool
+) -> Markup:
+    """Return the headline of an answer, of a track or, without both and without a module, of the shown point."""
+    if answer is not None:
+        return _answer_markup(answer["words"], answer["tasks"])
+    if track is not None:
+        return _answer_markup(track.answer)
+    return _answer_markup("") if has_module else _value_markup(nlp, x)
+
+
+def _answer_markup(words: str, tasks: Sequence[str] = ()) -> Markup:
+    """Return the content of the headline, with words for each of several tasks; the script fills it after a change."""
     return join_markup(
         [
-            tag("span", "" if answer is None else answer["words"], id="F"),
+            tag("span", words, id="F"),
             tag("span", id="word"),
             tag("span", id="words"),
-            tag("ul", *(tag("li", words) for words in tasks), id="task-values", hidden=not tasks),
+            tag("ul", *(tag("li", each) for each in tasks), id="task-values", hidden=not tasks),
         ]
     )
 
@@ -297,6 +317,11 @@ def _task(case: Case, solution: Solution | None) -> Markup:
     lines: list[Line] = []
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
         lines = [*task_lines(result.robot.task, case.units)]
+    return _task_markup(lines)
+
+
+def _task_markup(lines: Sequence[Line]) -> Markup:
+    """Return the place of the task in words."""
     return tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 
