@@ -197,7 +197,7 @@ units = { length = "cm" }
 pose = { position = [0, 0, { min = 15, max = 30 }] }
 task = [
   { name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf },
-  { name = "<!-- ${x} \\\\ $title WWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWW", sense = "max", axis = [1, 0, 0], pitch = inf },
+  { name = "<!-- ${x} \\\\ $title WWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWW", sense = "max", axis = [1, 0, 0], pitch = inf },
 ]
 combine = { method = "worst-case" }
 limits = { leg_length = { min = 2, max = 60 } }
