@@ -1,9 +1,9 @@
 """Measure live pages: values against CasADi, optima against ``solve``, sizes, times, and frames in Chromium.
 
-Run by hand: ``python bench/view.py [CASE ...] [--points N] [--frames] [--json FILE]``; without names, all shipped cases
-and all robots of the gallery. Values are relative to the largest of each array. Near a singularity, one unit in the last
-place of the variables changes values by more than the aim; there, a multiple of this change is the aim. A case without C
-is listed with the reason that its page states.
+Run by hand: ``python bench/view.py [CASE ...] [--points N] [--frames] [--json FILE]``; without names, all shipped
+cases and all robots of the gallery. Values are relative to the largest of each array. Near a singularity, one unit in
+the last place of the variables changes values by more than the aim; there, a multiple of this change is the aim. A case
+without C is listed with the reason that its page states.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def difference(values: FloatArray, expected: FloatArray) -> float:
 
 
 def frames(text: str) -> dict[str, float]:
-    """Return times in milliseconds: until the first frame, of a frame while a slider moves, and of the page's work in it.
+    """Return milliseconds until the first frame, of a frame while a slider moves, and of the page's work in it.
 
     The last two are medians.
     """
@@ -204,7 +204,7 @@ def main() -> int:
     for name in options.names or [*shipped_cases(), *model_names()]:
         try:
             row = measure(name, options.points, with_frames=options.frames)
-        except Exception as error:  # noqa: BLE001 - one case that fails does not end the measurements of all others
+        except Exception as error:
             row = {"name": name, "failed": f"{type(error).__name__}: {error}"}
         rows.append(row)
         shown = {key: value for key, value in row.items() if key != "name"}

@@ -147,13 +147,14 @@ class Case(Whole, Shown):
         )
         for name, value in resolved._asdict().items():
             store(self, name, value)
+        parameters = resolved.parameters
         if self.over_path is None:
             check_joint_rates(self.model, self.limits, has_path=self.path is not None)
         else:
-            along = with_joints_along(self.model, self.parameters, self.limits, self.units)
+            along = with_joints_along(self.model, parameters, self.limits, self.units)
             store(self, "model", along.model)
-            store(self, "parameters", along.parameters)
-        checked = check_parameters(self.parameters, self.model, len(self.tasks), self.units)
+            parameters = along.parameters
+        checked = check_parameters(parameters, self.model, len(self.tasks), self.units)
         store(self, "parameters", MappingProxyType(checked))
         known = {} if self.dimensions_per_task else self.parameters
         if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
@@ -236,7 +237,7 @@ class Case(Whole, Shown):
 
     @property
     def dimensions_per_task(self) -> Mapping[str, PerTask]:
-        """Components of the robot's parameters that are set anew for every task, by their name in the robot."""
+        """Components of the robot's parameters that are reset for every task, by their name in the robot."""
         return {
             name: value
             for item in self.model.parameters

@@ -60,7 +60,7 @@ def with_joints_along(model: Model, parameters: Mapping[str, Any], limits: Limit
 
 
 def _range(label: str, motions: Sequence[Any]) -> Free:
-    """Return the range of a free joint from the limits on it, with the smallest rate; it begins as near home as allowed.
+    """Return the range of a free joint from the limits on it, with their smallest rate and a start near home.
 
     Args:
         label: label of the joint.

@@ -97,9 +97,9 @@ def _override_place_of_case(tables: dict[str, Any], name: str, value: float | li
             raise CaseError(name, f"cannot be set: {whole} does not change along the path")
         table[place][end] = value
         return
-    parameters = tables.get("robot", {}).get("parameters")
-    if name.startswith(_JOINT) and isinstance(parameters, dict):
-        parameters[name] = value
+    robot = tables.get("robot")
+    if name.startswith(_JOINT) and isinstance(robot, dict):
+        robot.setdefault("parameters", {})[name] = value
         return
     if name not in places:
         raise CaseError(name, f"cannot be set; {_allowed(name, tables, places, rotations)}")

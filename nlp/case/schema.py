@@ -55,7 +55,7 @@ class DimensionRange(Range):
 
     per: Literal["task", "path", "pose"] | None = Field(
         default=None,
-        description="task: the dimension is set anew for every task; path: it changes along the tool path; pose: it is "
+        description="task: the dimension is reset for every task; path: it changes along the tool path; pose: it is "
         "set for every pose of the workspace; the same value everywhere if left out",
     )
     rate: float | None = Field(

@@ -41,8 +41,8 @@ _LARGE = 0.05
 _HEAVY = 1e-3
 #: Largest residual of closed loops; equations have magnitudes of about 1.
 _CLOSED = 1e-10
-#: Largest change of the loops' residuals by scaling the robot: rounding of its dimensions. They are compared at home, and
-#: at a distance from home relative to the robot's size or in radians.
+#: Largest change of the loops' residuals by scaling the robot: rounding of its dimensions. Residuals are
+#: compared at home, and away from it by a distance relative to the robot's size, or in radians.
 _SIMILAR, _AWAY = 1e-7, 0.1
 _SEED = 0
 #: Singular values below this fraction of the largest are zero: such a loop is mobile at home too.

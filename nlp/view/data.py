@@ -148,8 +148,8 @@ class QuantityData(TypedDict):
 class ViewData(TypedDict):
     """Everything that a live page needs besides its module and its drawing.
 
-    ``is_mean`` says whether F of a task is the mean over its poses, instead of the sum. ``stated_poses`` has the index of
-    the stated pose of each pose. ``pose_tasks`` has the index of its task if the
+    ``is_mean`` says whether F of a task is the mean over its poses, instead of the sum. ``stated_poses`` has the index
+    of the stated pose of each pose. ``pose_tasks`` has the index of its task if the
     dimensions or the pose change from task to task, and is empty otherwise.
     """
 

@@ -171,7 +171,8 @@ def test_a_started_view_replaces_the_picture_and_follows_the_colour_scheme(
     assert not chrome.find_element("id", "answer").is_displayed()
     # Robot, headline and the first slider are on the first screen.
     places = chrome.execute_script(
-        f"{IN_VIEW} return ['robot', 'answer', 'slider-0'].map((id) => root.getElementById(id).getBoundingClientRect().top)"
+        f"{IN_VIEW} return ['robot', 'answer', 'slider-0']"
+        ".map((id) => root.getElementById(id).getBoundingClientRect().top)"
     )
     assert max(places) < 900
     back = "return getComputedStyle(document.getElementById('live')).getPropertyValue('--back').trim()"
@@ -211,7 +212,8 @@ def test_bars_of_lengths_begin_at_their_range_and_rapid_moves_have_no_time(
     assert lengths["high"] > max([*values, *lengths["limits"]])
     assert (speeds["base"], speeds["low"]) == (0, -speeds["high"])
     read = (
-        f"{IN_VIEW} return [...root.querySelectorAll('#track .panel')].map((panel) => [panel.querySelector('h2').textContent,"
+        f"{IN_VIEW} return [...root.querySelectorAll('#track .panel')].map((panel) => ["
+        "panel.querySelector('h2').textContent,"
         " [...panel.querySelectorAll('.drive')].map((each) => [each.querySelector('output').textContent,"
         " parseFloat(each.querySelector('i').style.left), parseFloat(each.querySelector('i').style.width),"
         " [...each.querySelectorAll('b')].map((mark) => parseFloat(mark.style.left))])])"

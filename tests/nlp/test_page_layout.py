@@ -222,6 +222,6 @@ def test_a_path_page_without_a_live_view_says_why(
     found = Page(page.read_text(encoding="utf-8"))
     (note,) = re.findall(r"This page has no sliders: ([^<]*)\.<", found.text)
     assert_words(note, reason)
-    assert [a["id"] for tag, a in found.elements if tag == "section"][0] == "robot"
+    assert next(a["id"] for tag, a in found.elements if tag == "section") == "robot"
     assert [row[0] for row in found.tables["dimensions"][1:]] == ["x1", "x2", "x3", "x4"]
     check_names(found.text)

@@ -14,7 +14,7 @@ from builders import Array, Run, case_from, case_of, commands_in, output_of, ref
 from measures import circle_joints
 from path_cases import BASE, LEGS, PLATFORM, extreme, hexapod, program, turns_of
 
-from screwsynth.nlp import Case, InputError, Judgement, Outcome, ProgrammedPath, Sense
+from screwsynth.nlp import Case, CaseError, InputError, Judgement, Outcome, ProgrammedPath, Sense
 from screwsynth.nlp.path.dividing import divided_path
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
@@ -514,3 +514,14 @@ def test_curves_of_speeds_have_the_motion_of_the_dimension() -> None:
     assert found.joints.coordinates == pytest.approx(lengths(RADIUS_ROWS, 0, s, "x1"), abs=1e-10)
     speeds = (lengths(RADIUS_ROWS, 0, s + h, "x1") - lengths(RADIUS_ROWS, 0, s - h, "x1")) / (2 * h * 5)
     assert found.speeds == pytest.approx(speeds, abs=1e-7)
+
+
+def test_a_schedule_that_cannot_be_proved_is_refused_before_its_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.csv").write_text(written("x,y,z,roll,pitch,yaw,t", [(*row[:6], row[7]) for row in RADIUS_ROWS]))
+    angles = {"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}}
+    assert len(schedule_problem(moving(limits=angles)).points)
+    with pytest.raises(CaseError, match="home has no x1, which changes along the path"):
+        schedule_problem(moving(limits=angles | {"over": "path"}))

@@ -13,7 +13,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run
+from builders import Run, docs_script
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import CaseError, load_case, solve
@@ -182,6 +182,56 @@ def test_longest_strut(tmp_path: Path) -> None:
     )
     assert longest == pytest.approx(schedule.value, abs=1e-8)
     assert schedule.F.max() == pytest.approx(longest, abs=1e-8)
+
+
+def test_struts_that_need_the_motion_are_proved_along_their_schedule(tmp_path: Path, cli: Run) -> None:
+    """The shipped case has struts of 41 in: its schedule is proved, and the best constant turn, -3.6, is refuted."""
+    table = tmp_path / "struts.csv"
+    code, out, _ = cli("solve", "hexapod-struts", "--schedule", str(table))
+    words = " ".join(out.split())
+    assert code == 0
+    assert "longest leg = 40.7937" in words
+    assert "(no constant turn keeps the limits)" in words
+    with table.open() as text:
+        turns = [float(row["turn"]) * _DEGREE for row in csv.DictReader(text)]
+    angles, positions = _circle(200)
+    longest = max(
+        np.linalg.norm(_struts(a, p, s, 40), axis=1).max() for a, p, s in zip(angles, positions, turns, strict=True)
+    )
+    assert longest == pytest.approx(40.7938, abs=1e-3)
+    code, out, _ = cli("path", "hexapod-struts", "--along", str(table))
+    assert code == 0
+    assert "PROVED at every point: no singularity, 12 limits satisfied" in " ".join(out.split())
+    # Of all constant turns, the best leaves struts of 41.37 in.
+    constants = np.radians(np.linspace(-75, 75, 1501))
+    worst = [
+        max(
+            np.linalg.norm(_struts(a, p, s, 40), axis=1).max() for a, p in zip(angles[::2], positions[::2], strict=True)
+        )
+        for s in constants
+    ]
+    assert np.degrees(constants[np.argmin(worst)]) == pytest.approx(-3.6, abs=0.3)
+    assert min(worst) == pytest.approx(41.3719, abs=2e-3)
+    code, out, _ = cli("path", "hexapod-struts", "--set", "turn=-3.6")
+    assert code == 1
+    assert "leg_length limb 3- exceeds 41 in" in " ".join(out.split())
+
+
+def test_the_shipped_paths_are_the_written_ones() -> None:
+    script = docs_script("circles")
+    for name, lean in script.LEANS.items():
+        table = _YAW.with_name(f"{name}.csv").read_text()
+        assert script.table(lean) == table, "run `make docs`"
+        angles, positions = _circle(200)
+        rows = np.array([[float(each) for each in line.split(",")] for line in table.splitlines()[1:]])
+        np.testing.assert_allclose(rows[:, 0], 5 * angles, atol=1e-11)
+        np.testing.assert_allclose(rows[:, 1:4], positions, atol=1e-11)
+        w, x, y, z = rows[:, 4:].T
+        axes = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+        s, c = math.sin(lean * _DEGREE), math.cos(lean * _DEGREE)
+        np.testing.assert_allclose(
+            axes, np.stack([s * np.cos(angles), s * np.sin(angles), c + 0 * angles], axis=1), atol=1e-11
+        )
 
 
 def test_longest_strut_below_the_least_has_no_schedule(tmp_path: Path, cli: Run) -> None:
@@ -490,6 +540,7 @@ def test_report_has_map_and_points_of_the_schedule(tmp_path: Path, cli: Run) -> 
         ("pareto", "--goal", "max F", "--goal", "min limits.leg_length.max"),
         ("compare", "case", "6-ups"),
         ("export", "--format", "mjcf", "--out", "files"),
+        ("workspace",),
     ],
     ids=lambda words: words[0],
 )

@@ -297,7 +297,7 @@ def _answer_markup(words: str, tasks: Sequence[str] = ()) -> Markup:
 
 def _value_markup(nlp: Nlp, x: FloatArray) -> Markup:
     """Return the headline of a page without an answer and without a module: the objective at the shown point."""
-    F = nlp.program.kernels.derivatives(x, nlp.arguments).F
+    F = float(np.ravel(nlp.program.kernels.derivatives(x, nlp.arguments).F)[0])
     words = f"{_name_of_F(nlp.case)} = {number(F)} {unit_of_objective(nlp.case)}".rstrip()
     if len(nlp.case.tasks) > 1 or not math.isfinite(F):
         words = ""

@@ -97,9 +97,14 @@ def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
         yield (*page.picture, tag("figure", *shown, caption("Robots", page.below)))
     details = []
     for each in designs.details:
-        details += [tag("h3", each.name), paragraphs(each.sentences)]
+        details += [tag("h3", each.name), paragraphs(map(_in_words, each.sentences))]
         details += [] if each.table is None else [html_table(each.table, f"Dimensions: {each.name}")]
     yield "details", "Robots in detail", join_markup(details)
+
+
+def _in_words(sentence: str) -> str:
+    """Return a sentence with limits in words; one with an option of a command keeps the keys."""
+    return sentence if "--" in sentence else key_words(sentence)
 
 
 def designs_rows(designs: Designs[Row]) -> Markup:

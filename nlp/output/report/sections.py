@@ -295,7 +295,8 @@ def _variable_lines(case: Case, names: list[str]) -> list[str]:
 def _case(report: Report) -> Markup:
     """Return the problem of the case in sentences."""
     case, first = report.case, report.parts[0]
-    lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
+    words = case.model.description
+    lines = [f"{words[:1].upper()}{words[1:]}.", *(f"Note: {remark}." for remark in case.model.remarks)]
     lines += _objective_lines(case)
     if len(case.tasks) > 1:
         lines.append(f"Method that combines the tasks: {case.method.value}.")
@@ -338,14 +339,14 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     """Return the design for the combined tasks, then the separate optimum of each task."""
     case, combined = report.case, result.combined
     parts = [paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))]
-    robot = result.robot
+    robot, tables, ranks = result.robot, [], []
     if robot is not None:
-        parts.append(html_table(combined_design_table(case, combined, robot), _design_words(report), id="design"))
-        parts += [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
+        tables.append(html_table(combined_design_table(case, combined, robot), _design_words(report), id="design"))
+        ranks = [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
     if combined.tasks:
-        parts.append(
-            html_table(outcome_table(combined, result.tasks), "Tasks: F at this point and separately", id="outcomes")
-        )
+        outcomes = outcome_table(combined, result.tasks)
+        tables.append(html_table(outcomes, "Tasks: F at this point and separately", id="outcomes"))
+    parts += [beside(*tables), *ranks]
     parts.append(paragraphs(change_lines(result)))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]

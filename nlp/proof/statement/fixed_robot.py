@@ -81,6 +81,19 @@ def check_changing(case: Case, names: Sequence[str]) -> None:
         CaseError: another dimension is free, the robot does not have six straight legs, or a limit is about home.
     """
     case.fixed_parameters("a path is judged with fixed dimensions", names)
+    check_moving(case, names)
+
+
+def check_moving(case: Case, names: Sequence[str]) -> None:
+    """Refuse robots and limits that are not supported along a path while dimensions change.
+
+    Args:
+        case: the case; its other dimensions may be free.
+        names: dimensions that change along the path: components of the robot's parameters.
+
+    Raises:
+        CaseError: the robot does not have six straight legs, or a limit is about home.
+    """
     if not names:
         return
     first = case.parameter_name(names[0])

@@ -114,6 +114,8 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
     places = [each.index for each in found.dependent]
     if not places:
         return box, workspace
+    if box.settings:
+        raise NotJudgedError("dependent coordinates of the pose are not judged while joints change along the path")
     stated, angle = (*workspace.position, *workspace.turns.angles), _STILL
     length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in workspace.position])
     moved = [k for k in places if np.ptp(ends_of(stated[k])) > (length if k < 3 else angle)]

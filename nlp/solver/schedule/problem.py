@@ -35,9 +35,11 @@ from ...case.pose import Free, OverPoses
 from ...case.task import LEG_LENGTH, SMALLEST, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
+from ...path.settings import changing_of
 from ...path.waypoints import Waypoints, waypoints
 from ...program.actuators import signed_values
 from ...program.layout import reference_of
+from ...proof.statement.fixed_robot import check_moving
 
 #: First words of the name of a limb's reach among the limits.
 REACH = "reach limb "
@@ -226,7 +228,7 @@ class ScheduleProblem:
         count = len(self.points)
         design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
         found = function.map(count)(design, np.reshape(s, (count, -1)).T, self.numbers)
-        return np.abs(found.full()).max(axis=0, initial=0.0)
+        return np.asarray(np.abs(found.full()).max(axis=0, initial=0.0))
 
     def combined(self, objective: FloatArray) -> FloatArray:
         """Return the value of each point from its objectives (..., T): their sum, or the worst."""
@@ -279,6 +281,8 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
+    if case.limits_over:
+        check_moving(case, tuple(changing_of(case).own.values()))
     points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
