@@ -48,13 +48,13 @@ def _parts_of(name: str, head: str, body: Sequence[str]) -> list[str]:
     for part in parts:
         first, own = set[str](), set[str]()
         for line in part:
-            made, result = _ASSIGNMENT.match(line), _RESULT.match(line)
-            if made is None and result is None:
+            made = _ASSIGNMENT.match(line)
+            match = made or _RESULT.match(line)
+            if match is None:
                 return []
-            first |= (
-                set(_VARIABLE.findall((made.group(2) if made else result.group(1)) if made or result else "")) - own
-            )
-            own |= {made.group(1)} if made else set()
+            first |= set(_VARIABLE.findall(match.group(2 if made else 1))) - own
+            if made:
+                own.add(made.group(1))
         read.append(first)
         written.append(own)
     # Variables that a part leaves for later ones: those that are read again before they are written.

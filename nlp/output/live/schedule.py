@@ -130,7 +130,7 @@ def _case_along(along: _Along) -> Case:
         names = start.component_names(item)
         values = [settings.get(name, value) for name, value in zip(names, start.components(item.name), strict=True)]
         parameters[item.name] = values if len(values) > 1 else values[0]
-    size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions"))
+    size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions").tolist())
     # The page evaluates points of the path, and needs no optimum of the pose.
     posed = replace(start, parameters=parameters, search=start.search.but(1, None))
     return with_free_pose(posed, problem.points.positions, _largest_turn(along), size)

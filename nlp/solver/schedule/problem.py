@@ -209,7 +209,7 @@ class ScheduleProblem:
             d: (n,) design.
             s: (N, k) settings.
             which: indices of the points; all if left out.
-            estimated: If true, the smallest singular value is the smooth estimate of the program, which is not above it.
+            estimated: If true, the smallest singular value is the smooth estimate of the program, not above it.
         """
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
