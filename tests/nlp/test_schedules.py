@@ -518,7 +518,8 @@ def test_report_has_map_and_points_of_the_schedule(tmp_path: Path, cli: Run) -> 
     page = tmp_path / "page.html"
     assert cli("report", str(_written(tmp_path, count=12)), "--out", str(page))[0] == 0
     text = page.read_text()
-    schedule = text[text.index('id="schedule"') : text.index('id="robot"')]
+    schedule = text[text.index('<section id="schedule"') :]
+    schedule = schedule[: schedule.index('id="robot"')]
     assert "data:image/svg+xml" in schedule
     points = schedule[schedule.index('id="points"') :]
     words = re.sub(r"<[^>]*>", "", text)
