@@ -17,7 +17,6 @@ from ...words.numbers import key_words
 from ...words.poses import pose_words
 from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
-from ..pictures.figures import page_pictures
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (
     Markup,
@@ -28,10 +27,10 @@ from .markup import (
     image_source,
     join_markup,
     paragraphs,
-    picture_element,
     tag,
     whole_page,
 )
+from .stills import still_element
 from .verdicts import dimensions_table, origin, refuting_place, shown_command, shown_verdicts
 
 
@@ -109,11 +108,11 @@ def _robot(report: WorkspaceReport) -> Markup:
     if worst is None:
         return Markup("")
     try:
-        wide, narrow = page_pictures(drawing_at(report.case, worst))
+        drawing = drawing_at(report.case, worst)
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = picture_element(wide, narrow, alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
+    image = still_element(drawing, alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
     words = caption("Robot at the worst pose", f"{key_words(claim_words(worst))}; at {at}.")
     return tag("figure", image, words, shown_command(report.command(worst.pose)))
 
