@@ -9,7 +9,8 @@ import pytest
 from builders import Run, assert_words, saved
 from pages import Page
 
-from screwsynth.nlp.words.numbers import key_words, spaced
+from screwsynth.nlp.output.report.stills import compact
+from screwsynth.nlp.words.numbers import key_words, side_words, spaced
 
 #: Key of a limit as a case file has it, such as ``limits.leg_length.max`` or ``leg_length.max``.
 KEY = re.compile(r"\blimits\.[a-z]|\b[a-z]\w*\.(?:min|max)\b")
@@ -224,3 +225,27 @@ def test_a_path_page_without_a_live_view_says_why(
     assert next(a["id"] for tag, a in found.elements if tag == "section") == "robot"
     assert [row[0] for row in found.tables["dimensions"][1:]] == ["x1", "x2", "x3", "x4"]
     check_names(found.text)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("footprint.base", "footprint base"),
+        ("leg_length.max", "maximum leg length"),
+        ("p_y.min", "minimum p_y"),
+        ("leg_length limb 1- max", "leg length limb 1- max"),
+        ("p_z max", "p_z max"),
+    ],
+)
+def test_active_limits_in_words(name: str, words: str) -> None:
+    assert side_words(name) == words
+
+
+def test_a_picture_of_a_page_has_the_outlines_of_the_file_with_fewer_bytes() -> None:
+    text = b'<path d="M 1.2345 20.00 \nL 3.0 -4.506  Q 10 0.5 7 8 z" style="fill: none"/>'
+    assert compact(text) == b'<path d="M1.23 20L3 -4.5Q10 0.5 7 8z" style="fill: none"/>'
+    outline = '<path d="M 1 2 \nL 3 4" style="fill: #17212b'
+    edge, fill = f'{outline}; stroke: #ffffff"/>', f'{outline}"/>'
+    merged = '<path d="M1 2L3 4" style="fill: #17212b; stroke: #ffffff; paint-order: stroke"/>'
+    assert compact(f"{edge}\n{fill}".encode()) == merged.encode()
+    assert compact(f"{fill}\n{edge}".encode()).count(b"<path") == 2
