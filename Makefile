@@ -67,6 +67,7 @@ house: $(VENV)/ready
 docs: $(VENV)/ready ## write the program's output into the documentation
 	$(BIN)/python -P docs/gallery.py
 	$(BIN)/python -P docs/pocket.py
+	$(BIN)/python -P docs/circles.py
 	$(BIN)/python -P docs/refresh.py
 	$(BIN)/python -P docs/introductions.py
 	$(BIN)/python -P docs/tour.py

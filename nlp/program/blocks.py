@@ -109,8 +109,9 @@ class Blocks:
         own = {nlp.program.constraints.index(each) for each in epigraph.constraints} if epigraph else set[int]()
         for block in self.blocks:
             terms = nlp.sign * values[list(block.terms)]
-            # In a worst case the largest of the terms counts, for both senses.
-            cost = terms.max(axis=0) if epigraph else terms.sum(axis=0)
+            # In a worst case the largest of the terms counts, for both senses. A block without terms, such as a
+            # dimension that changes nothing but limits, has no cost.
+            cost = terms.max(axis=0) if epigraph and len(terms) else terms.sum(axis=0)
             limits = [k for k in block.constraints if k not in own]
             violation = outside[limits].max(axis=0, initial=0.0)
             violation = np.where(np.isfinite(violation) & np.isfinite(cost), violation, np.inf)

@@ -10,8 +10,9 @@ from ..case.case import Case
 from ..case.choices import values_of_component
 from ..case.names import name_of_task
 from ..case.overrides import ENDS, Settings
+from ..case.pathfile import TURN
 from ..case.pose import Free, Pose, RotationForm
-from ..errors import InputError
+from ..errors import InputError, listing
 from ..evidence.state import PlatformPose
 from ..system.jsonvalues import Vector
 from .claims import refuted_claims
@@ -52,7 +53,8 @@ def robots_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fa
         of_any_case: If true, the result may belong to another case with the same robot and units.
 
     Raises:
-        InputError: the result belongs to another case, has other units or tasks, or is no answer.
+        InputError: the result belongs to another case, has other units or tasks, is no answer, or has dimensions that
+            change along a path and not in the case.
     """
     name, model = result.head.case, result.head.model
     if model != case.model.name or (name != case.name and not of_any_case):
@@ -65,6 +67,10 @@ def robots_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fa
     settings = _robots(result)
     if not settings or (not isinstance(result, EvaluationResult) and not result.status.is_answer):
         raise InputError(f"{source}: contains no answer: the solve failed{_reached_words(settings, case)}")
+    moving = [name for name in _moving(result) if name not in case.settings]
+    if moving:
+        fault = f"{listing(moving)} changes along the path, but {case.name!r} has one value for it"
+        raise InputError(f"{source}: {fault}; set the value with --set")
     if len(settings) > 1 and not case.changes:
         fault = f"has a robot for each of {len(settings)} tasks, but {case.name!r} has one robot for all tasks"
         raise InputError(f"{source}: {fault}; set the values with --set")
@@ -72,6 +78,13 @@ def robots_of(result: Answer, source: str, case: Case, *, of_any_case: bool = Fa
         fault = f"has a robot for each of {len(settings)} tasks, but {case.name!r} has {len(case.tasks)} tasks"
         raise InputError(f"{source}: {fault}")
     return settings
+
+
+def _moving(result: Answer) -> tuple[str, ...]:
+    """Return the names of the dimensions that change along the path of a result."""
+    if not isinstance(result, SolveResult) or result.schedule is None:
+        return ()
+    return tuple(name for name in result.schedule.names if name != TURN)
 
 
 def _robots(result: Answer) -> tuple[RobotData, ...]:
@@ -165,19 +178,25 @@ def settings_of(robots: Sequence[RobotData], case: Case) -> Settings:
 
 
 def dimensions_of(robots: Sequence[RobotData], case: Case) -> Settings:
-    """Return the dimensions of a robot, or of the robot of each task, by their names in the case, in its units."""
+    """Return the dimensions of a robot, or of the robot of each task, by their names in the case, in its units.
+
+    Dimensions that change along the path of the case are left out: a robot has one value of each.
+    """
     found: dict[str, float | list[float]] = {}
     changing = case.dimensions_per_task
     for item in case.model.parameters:
+        if case.settings.keys() & set(case.component_names(item)):
+            continue  # a schedule gives its values
         of_task = [_setting(robot.parameters[item.name]) for robot in robots]
-        if not changing.keys() & set(item.components):
+        names = case.component_names(item)
+        if not changing.keys() & set(item.components) and not case.settings.keys() & set(names):
             found[case.parameter_name(item.name)] = of_task[0]
             continue
         parts = [each if isinstance(each, list) else [each] for each in of_task]
-        for k, (key, name) in enumerate(zip(item.components, case.component_names(item), strict=True)):
+        for k, (key, name) in enumerate(zip(item.components, names, strict=True)):
             if key in changing:
                 found |= {name_of_task(name, j): parts[j % len(parts)][k] for j in range(len(case.tasks))}
-            else:
+            elif name not in case.settings:
                 found[name] = parts[0][k]
     return found
 

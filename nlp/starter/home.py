@@ -85,6 +85,8 @@ class Home(NamedTuple):
         free: index of the free parameter; None for no free parameter.
         motion: feasible motion of the platform at home and around it; None for six degrees of freedom.
         is_flat: True if F of this motion is the same at home and around it.
+        motions: feasible motions at home and around it: translations along z, x and y, then rotations about these
+            directions, then any other motions.
     """
 
     state: RobotState
@@ -97,6 +99,7 @@ class Home(NamedTuple):
     free: int | None
     motion: Screw | None
     is_flat: bool
+    motions: tuple[Screw, ...]
 
 
 class _Place(NamedTuple):
@@ -147,13 +150,24 @@ def read_home(model: Model, size: float) -> Home:
         possible = _common_twists(places, size)
     mobility = len(_regular_twists(places, size)[0])
     motion, is_flat = None, False
+    motions = _motions(possible) if len(possible) else []
     if 0 < len(possible) < 6:
-        motion, is_flat = _motion(possible, places, size)
+        motion, is_flat = _motion(motions, places, size)
     free = _free_parameter(model, moves, turning, reach, size, motion)
     state, arm = evaluate(free_pose, _home_point(free_pose)), _arm(places[0], size)
     near = _places(_program(model, moves, turning, reach, length=arm))
     condition = min(_condition(each, arm) for each in (near if state.is_singular else near[:1]))
-    return Home(state, arm, condition, mobility, moves, turning, reach, free, motion, is_flat)
+    screws = tuple(_screw(twist, places[0].position, size) for twist in motions)
+    return Home(state, arm, condition, mobility, moves, turning, reach, free, motion, is_flat, screws)
+
+
+def objective_at_home(model: Model, home: Home, motion: Screw) -> float:
+    """Return F of a motion at home, with the dimensions and the characteristic length of a starter case."""
+    parameters: dict[str, tuple[Value, ...]] = {item.name: starter_values(item) for item in model.parameters}
+    point = None if math.isinf(motion.pitch) else motion.point
+    task = Task.screw(Sense.MAX, axis=motion.axis, point=point, pitch=motion.pitch)
+    nlp = formulate(Case(model, parameters, model.home, [task], characteristic_length=home.arm))
+    return evaluate(nlp, _home_point(nlp)).F
 
 
 def _program(
@@ -279,10 +293,11 @@ def _slides(twists: FloatArray) -> FloatArray:
     return np.asarray(left[:, int(np.count_nonzero(values > _ZERO)) :].T @ twists)
 
 
-def _motion(possible: FloatArray, places: list[_Place], size: float) -> tuple[Screw, bool]:
-    """Return a motion that is feasible at all poses, and True if its F is the same at all of them.
+def _motions(possible: FloatArray) -> list[FloatArray]:
+    """Return twists that are feasible at all poses.
 
-    Translations along z, x and y are preferred, then rotations about these directions, then any other motion.
+    Translations along z, x and y come first, then rotations about these directions. Without any of them, the result is
+    a basis of all feasible twists.
     """
     slides = _slides(possible)
     spins = np.where(np.abs(possible[:, 3:]) > _ZERO, possible[:, 3:], 0.0)
@@ -298,7 +313,11 @@ def _motion(possible: FloatArray, places: list[_Place], size: float) -> tuple[Sc
             twist = shares @ possible
             twist[:3] -= (twist[:3] @ slides[:, :3].T) @ slides[:, :3]
             found.append(twist)
-    found = found or [*slides, *possible]
+    return found or [*slides, *possible]
+
+
+def _motion(found: list[FloatArray], places: list[_Place], size: float) -> tuple[Screw, bool]:
+    """Return the first of the feasible twists whose F changes with the pose, and False; else the first, and True."""
     for twist in found:
         F = _values(twist, places, size)
         if max(F) - min(F) > _ZERO * max(F):

@@ -54,43 +54,53 @@ def starter_case(model: Model, robot_file: str | None = None) -> str:
         model: the robot.
         robot_file: name of the robot file in the folder of the case; None for a robot by name or definition.
     """
-    search, units = Search(), _units_of(model)
-    lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
-    home = read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
+    units, home = units_of(model), home_of(model)
     workspace = _workspace_lines(model, home, units)
     torques = _torque_lines(model, home)
     lines = [
         f'title = "My {model.name}"',
         "",
-        "[units]",
-        _commented(f"length = {json.dumps(units.length, ensure_ascii=False)}", "name of the length unit in all output"),
-        _commented(f'angle = "{units.angle}"', 'or "rad"'),
-        "",
-        *_robot_lines(model, robot_file, home.arm),
+        *robot_lines(model, robot_file, home.arm),
         "",
         "# A number is a fixed value; { min = a, max = b } is a free variable, with an optional start.",
         "[robot.parameters]",
-        *(_parameter_line(item, units, is_free=index == home.free) for index, item in enumerate(model.parameters)),
+        *(parameter_line(item, units, is_free=index == home.free) for index, item in enumerate(model.parameters)),
         "",
         *_pose_lines(model, home),
         "",
         *_task_lines(model, home),
         "",
-        _commented("[limits]", "limits of a buildable design; the documentation lists all"),
-        *_limit_lines(model, home),
+        commented("[limits]", "limits of a buildable design; the documentation lists all"),
+        *limit_lines(model, home),
         "",
         *(f"# {line}".rstrip() for line in torques),
         *([""] if torques else []),
         *(f"# {line}" for line in workspace),
         *([""] if workspace else []),
-        "[solve]",
-        _commented(f"starts = {search.starts}", "starting points; more are more likely to find the best optimum"),
-        f"seed = {search.seed}",
+        *search_lines(),
     ]
+    return text_of(lines)
+
+
+def home_of(model: Model) -> Home:
+    """Return a robot in its home configuration, with the values that a starter case states."""
+    lengths = [abs(value) for item in model.parameters if item.dimension is Dimension.LENGTH for value in item.typical]
+    return read_home(model, math.hypot(*model.home) or max(lengths, default=0.0) or _size(model) or 1 / 0.25)
+
+
+def text_of(lines: Sequence[str]) -> str:
+    """Return the text of a case file from its lines."""
     return "\n".join(_aligned(lines)) + "\n"
 
 
-def _commented(text: str, comment: str) -> str:
+def search_lines() -> list[str]:
+    """Return the lines of the table ``[solve]``."""
+    search = Search()
+    starts = commented(f"starts = {search.starts}", "starting points; more are more likely to find the best optimum")
+    return ["[solve]", starts, f"seed = {search.seed}"]
+
+
+def commented(text: str, comment: str) -> str:
     """Return a line with a comment, separated by a tabulator."""
     return f"{text}\t# {comment}"
 
@@ -106,15 +116,25 @@ def _aligned(lines: Sequence[str]) -> list[str]:
     return found
 
 
-def _robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
-    """Return the lines of the table ``[robot]``, without the parameters."""
+def robot_lines(model: Model, robot_file: str | None, arm: float) -> list[str]:
+    """Return the lines of the tables ``[units]`` and ``[robot]``, without the parameters."""
+    units = units_of(model)
     definition = model.options.get("definition")
     options = _option_lines(model)
     robot = f'model = "{model.name}"' if definition is None else f"definition = {toml_text(plain_value(definition))}"
     if robot_file is not None:
         robot = f"file = {json.dumps(robot_file, ensure_ascii=False)}"
-    length = _commented(f"characteristic_length = {arm:g}", "makes unit couples comparable with unit forces")
-    return ["[robot]", robot, *options, *([length] if model.has_couples else [])]
+    length = commented(f"characteristic_length = {arm:g}", "makes unit couples comparable with unit forces")
+    return [
+        "[units]",
+        commented(f"length = {json.dumps(units.length, ensure_ascii=False)}", "name of the length unit in all output"),
+        commented(f'angle = "{units.angle}"', 'or "rad"'),
+        "",
+        "[robot]",
+        robot,
+        *options,
+        *([length] if model.has_couples else []),
+    ]
 
 
 def _option_lines(model: Model) -> list[str]:
@@ -133,24 +153,24 @@ def _pose_lines(model: Model, home: Home) -> list[str]:
     """Return the lines of the table ``[pose]``, with the coordinates free that the robot can change."""
     turning = home.turning
     lines = [
-        _commented("[pose]", "pose of the platform in the base frame; all axes are parallel at home"),
+        commented("[pose]", "pose of the platform in the base frame; all axes are parallel at home"),
         *_range_lines(model, home),
         _position_line(model, home, home.reach),
     ]
     if home.moves[2]:
         height = _free_number(model.home[2], home.reach)
-        lines.append(f"# fixed height: write {_number(model.home[2])} in place of {height}")
+        lines.append(f"# fixed height: write {number(model.home[2])} in place of {height}")
     degrees = round(math.degrees(turning.largest))
     angle = f"angle = {{ min = {-degrees}, max = {degrees} }}"
     if turning.numbers == 3:
-        lines.append(_commented(f"rotation = {{ {angle} }}", f"rotation about any axis by at most {degrees} deg"))
+        lines.append(commented(f"rotation = {{ {angle} }}", f"rotation about any axis by at most {degrees} deg"))
     if turning.numbers == 1:
         lines.append(
-            _commented(f"rotation = {{ axis = {_vector(turning.axis)}, {angle} }}", "rotation about this axis only")
+            commented(f"rotation = {{ axis = {vector(turning.axis)}, {angle} }}", "rotation about this axis only")
         )
     if home.mobility == 6:
         other = f"# rotation = {{ axis = [0, 0, 1], {angle} }}"
-        lines.append(_commented(other, "rotation about this axis only; without rotation: none"))
+        lines.append(commented(other, "rotation about this axis only; without rotation: none"))
     count = sum(home.moves) + turning.numbers
     if count > home.mobility:
         lines.append(f"# {home.mobility} of these {count} coordinates are independent; the loops determine the rest.")
@@ -176,7 +196,7 @@ def _has_workspace(model: Model, home: Home) -> bool:
 def _task_lines(model: Model, home: Home) -> list[str]:
     """Return the lines of a task with a feasible motion of the robot."""
     motion = home.motion
-    sense = _commented('sense = "max"', 'maximise F, the squared work rates in this motion; or "min"')
+    sense = commented('sense = "max"', 'maximise F, the squared work rates in this motion; or "min"')
     if motion is None:
         pitch = 2 * 10.0 ** round(math.log10(math.hypot(*model.home) / 35)) if any(model.home) else 1.0
         name, motion = "screw motion", Screw(np.array([0.0, 1.0, 2.0]), np.array(model.home), pitch, 1.0)
@@ -186,23 +206,23 @@ def _task_lines(model: Model, home: Home) -> list[str]:
         kind = "rotation" if abs(motion.pitch) < 1e-9 * home.reach else "screw motion"
         name = f"{kind} about {_direction(motion.axis)}"
     lines = [
-        _commented("[[task]]", f"motion of the platform, which has {_degrees(home.mobility)} of freedom"),
+        commented("[[task]]", f"motion of the platform, which has {_degrees(home.mobility)} of freedom"),
         f'name = "{name}"',
         sense,
     ]
     if home.is_flat:
         lines.append("# F of this motion is the same at all poses: all designs within the limits are equally good.")
-    lines.append(_commented(f"axis = {_vector(motion.axis)}", "direction of the screw axis, of any length but zero"))
+    lines.append(commented(f"axis = {vector(motion.axis)}", "direction of the screw axis, of any length but zero"))
     if math.isinf(motion.pitch):
-        return [*lines, _commented("pitch = inf", "translation along the axis; 0: rotation about it")]
+        return [*lines, commented("pitch = inf", "translation along the axis; 0: rotation about it")]
     return [
         *lines,
-        _commented(f"point = {_vector(motion.point)}", "any point on the screw axis"),
-        _commented(f"pitch = {_number(motion.pitch)}", "translation per radian; 0: rotation; inf: translation"),
+        commented(f"point = {vector(motion.point)}", "any point on the screw axis"),
+        commented(f"pitch = {number(motion.pitch)}", "translation per radian; 0: rotation; inf: translation"),
     ]
 
 
-def _limit_lines(model: Model, home: Home) -> list[str]:
+def limit_lines(model: Model, home: Home) -> list[str]:
     """Return the lines of limits that the robot satisfies at home."""
     lines = [*_actuator_lines(model, home), *_free_joint_lines(model, home), *_joint_lines(model, home)]
     is_singular = home.state.is_singular
@@ -214,7 +234,7 @@ def _limit_lines(model: Model, home: Home) -> list[str]:
         place = "near home, which is singular" if is_singular else "at home"
         table = f"condition_number = {{ max = {largest:g}, length = {home.arm:g} }}"
         lines.append(
-            _commented(table, f"of J, with moments divided by length; {float(f'{home.condition:.2g}'):g} {place}")
+            commented(table, f"of J, with moments divided by length; {float(f'{home.condition:.2g}'):g} {place}")
         )
     return lines
 
@@ -244,14 +264,14 @@ def _torque_lines(model: Model, home: Home) -> list[str]:
     load = "force = [0, 0, -10]"
     if home.motion is not None:
         is_slide = math.isinf(home.motion.pitch)
-        load = f"force = {_vector(-10 * home.motion.axis)}" if is_slide else f"moment = {_vector(home.motion.axis)}"
+        load = f"force = {vector(-10 * home.motion.axis)}" if is_slide else f"moment = {vector(home.motion.axis)}"
     return [
         f"F is about {subject}. The torque of a motor also depends on its crank and on the load:",
-        _commented("[[load]]", "that the motors hold"),
+        commented("[[load]]", "that the motors hold"),
         'name = "load"',
-        _commented(load, "on the platform, along the axes of the world"),
-        _commented("[objective]", 'in the place of F; set sense = "min" in the task, or leave the task out'),
-        _commented('minimise = "actuator_force"', "the largest torque of a motor; or actuator_speed, actuator_power"),
+        commented(load, "on the platform, along the axes of the world"),
+        commented("[objective]", 'in the place of F; set sense = "min" in the task, or leave the task out'),
+        commented('minimise = "actuator_force"', "the largest torque of a motor; or actuator_speed, actuator_power"),
     ]
 
 
@@ -262,10 +282,10 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
         for quantity in model.quantities:
             if quantity.name == "actuator_angle":
                 range_ = f"{{ min = {-_SWING}, max = {_SWING} }}"
-                lines.append(_commented(f"actuator_angle = {range_}", "of every revolute actuator, from home"))
+                lines.append(commented(f"actuator_angle = {range_}", "of every revolute actuator, from home"))
             if quantity.name == "actuator_length":
                 range_ = f"{{ min = {-home.reach:g}, max = {home.reach:g} }}"
-                lines.append(_commented(f"actuator_length = {range_}", "of every prismatic actuator, from home"))
+                lines.append(commented(f"actuator_length = {range_}", "of every prismatic actuator, from home"))
         return lines
     ends = [ca.horzcat(*[getattr(leg, plate) for leg in model.legs]).T for plate in ("base", "platform")]
     values = np.array([value for item in model.parameters for value in starter_values(item)])
@@ -278,8 +298,8 @@ def _actuator_lines(model: Model, home: Home) -> list[str]:
     apart = math.sqrt(min(squares, default=0.0))
     clearance = float(f"{0.02 * lengths.max():.1g}")
     return [
-        _commented(f"leg_length = {{ min = {low:g}, max = {high:g} }}", "between joint centres"),
-        *([_commented(f"leg_clearance = {{ min = {clearance:g} }}", "between legs")] if apart > clearance else []),
+        commented(f"leg_length = {{ min = {low:g}, max = {high:g} }}", "between joint centres"),
+        *([commented(f"leg_clearance = {{ min = {clearance:g} }}", "between legs")] if apart > clearance else []),
     ]
 
 
@@ -290,7 +310,7 @@ def _free_joint_lines(model: Model, home: Home) -> list[str]:
         if each.is_free:
             most = _SWING if each.dimension is Dimension.ANGLE else home.reach
             table = f"joint.{toml_key(each.joint)} = {{ min = {-most:g}, max = {most:g} }}"
-            lines.append(_commented(table, "of an actuator that the pose does not determine, from home"))
+            lines.append(commented(table, "of an actuator that the pose does not determine, from home"))
     return lines
 
 
@@ -300,7 +320,7 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
     if angles is not None:
         cone = max(_CONE, 5 * math.ceil((math.degrees(float(angles.max())) + 10) / 5))
         return [
-            _commented(f"{plate}_joint_angle = {cone}", f"largest angle of each leg to the z axis of the {plate}")
+            commented(f"{plate}_joint_angle = {cone}", f"largest angle of each leg to the z axis of the {plate}")
             for plate in ("base", "platform")
         ]
     balls = [joint for joint in model.joints if joint.type == "S" and joint.cone is not None]
@@ -308,7 +328,7 @@ def _joint_lines(model: Model, home: Home) -> list[str]:
     if len(keys) > _CONES:
         return []
     comment = "half angle of the ball joint's cone, about its direction at home"
-    return [_commented(f"joint.{toml_key(key)}.cone = {_CONE}", comment) for key in keys]
+    return [commented(f"joint.{toml_key(key)}.cone = {_CONE}", comment) for key in keys]
 
 
 def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
@@ -322,7 +342,7 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     angle = f"{{ min = {-degrees}, max = {degrees} }}"
     rotation = {
         0: [],
-        1: [f"rotation = {{ axis = {_vector(turning.axis)}, angle = {angle} }}"],
+        1: [f"rotation = {{ axis = {vector(turning.axis)}, angle = {angle} }}"],
         3: [f"rotation = {{ angle = {angle} }}"],
     }[turning.numbers]
     if turning.numbers == 3 and home.mobility < 6:
@@ -332,10 +352,10 @@ def _workspace_lines(model: Model, home: Home, units: Units) -> list[str]:
     fixed = ""
     if home.free is not None:
         item = model.parameters[home.free]
-        value = [_number(units.shown(each, item.dimension)) for each in starter_values(item)]
+        value = [number(units.shown(each, item.dimension)) for each in starter_values(item)]
         fixed = f" --set {item.name}={','.join(value)}"
     question = f"screwsynth workspace{fixed} verifies all limits at all these poses"
-    return [_commented("[workspace]", question), position, *rotation]
+    return [commented("[workspace]", question), position, *rotation]
 
 
 def _turning_about(model: Model, home: Home, reach: float, turn: float) -> list[str]:
@@ -382,23 +402,30 @@ def _size(model: Model) -> float:
     return max((each for each in sizes if math.isfinite(each)), default=0.0)
 
 
-def _units_of(model: Model) -> Units:
+def units_of(model: Model) -> Units:
     """Return the units of a starter case; the length unit of a robot file without one is called ``unit``."""
     return _UNITS if not model.structure else Units(model.length_unit or "unit", "deg")
 
 
-def _parameter_line(parameter: Parameter, units: Units, *, is_free: bool) -> str:
-    """Return the line of a parameter, free around its value in a starter case or fixed."""
+def parameter_line(parameter: Parameter, units: Units, *, is_free: bool, further: str = "") -> str:
+    """Return the line of a parameter, free around its value in a starter case or fixed.
+
+    Args:
+        parameter: the parameter.
+        units: units of the case.
+        is_free: If true, the parameter has a range.
+        further: further keys of the range, such as ``, per = "task"``.
+    """
     values = [units.shown(value, parameter.dimension) for value in starter_values(parameter)]
     widths = [units.shown(each, parameter.dimension) if is_free else 0.0 for each in free_widths(parameter)]
     domain = [units.shown(end, parameter.dimension) for end in (parameter.lower, parameter.upper)]
     texts = [
-        _free_number(value, width, domain) if width else _number(value)
+        _free_number(value, width, domain).replace(" }", f"{further} }}") if width else number(value)
         for value, width in zip(values, widths, strict=True)
     ]
     text = texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
     unit = units.label(parameter.dimension) or "a plain number"
-    return _commented(f"{parameter.name} = {text}", f"{parameter.description}, {unit}")
+    return commented(f"{parameter.name} = {text}", f"{parameter.description}, {unit}")
 
 
 def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.inf, math.inf)) -> str:
@@ -406,7 +433,7 @@ def _free_number(middle: float, width: float, domain: Sequence[float] = (-math.i
     digits = 1 - math.floor(math.log10(width))
     ends = [round(end, digits) + 0.0 for end in (middle - width, middle + width)]
     lower, upper = max(ends[0], domain[0]), min(ends[1], domain[1])
-    return f"{{ min = {_number(lower)}, max = {_number(upper)} }}" if lower < upper else _number(middle)
+    return f"{{ min = {number(lower)}, max = {number(upper)} }}" if lower < upper else number(middle)
 
 
 def _degrees(count: int) -> str:
@@ -414,14 +441,14 @@ def _degrees(count: int) -> str:
     return f"{count} degree{'' if count == 1 else 's'}"
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """Return a number as TOML; rounding errors of 0 become 0."""
     return f"{value if abs(value) > 1e-9 else 0:.10g}"
 
 
-def _vector(values: Sequence[float] | FloatArray) -> str:
+def vector(values: Sequence[float] | FloatArray) -> str:
     """Return three numbers as TOML."""
-    return f"[{', '.join(_number(float(each)) for each in values)}]"
+    return f"[{', '.join(number(float(each)) for each in values)}]"
 
 
 def _direction(axis: FloatArray) -> str:

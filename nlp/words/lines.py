@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
-from ..case.task import Sense
+from ..case.task import Sense, Task
 from ..evidence.optimality import CURVED, PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..results.rounding import ordered, robot_size, settled, task_F
@@ -39,6 +39,12 @@ _FULL_RANK = 6
 _FEW, _MANY = 0.125, 8
 #: Smallest over largest singular value of J, below which a regular robot has a caution.
 _NEAR = 1e-3
+#: Motions that move with a tool path, by the key of the case file.
+_FOLLOWED = {
+    "feed": "translation along the feed at each point",
+    "tool": "rotation about the tool's axis at each point",
+    "thrust": "translation along the tool's axis at each point",
+}
 #: Distance of optimal points, as a fraction of the variable ranges: more distant points are a set, not one optimum.
 SET = 1e-3
 
@@ -63,6 +69,11 @@ def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
     screw = screw_words(task.motion, units, reach_of(task.motion, 0.0))
     yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
     yield Line(f"nearest to the origin at {nearest}", label="task axis")
+
+
+def followed_words(task: Task) -> str:
+    """Return the motion of a task that moves with the tool path of its case."""
+    return _FOLLOWED[task.follows]
 
 
 def task_words(task: TaskData, units: Units) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from builders import Run
+from path_cases import BASE, PLATFORM
 
 from screwsynth.nlp import load_case, solve
 
@@ -41,7 +44,25 @@ def test_limbs_with_rails_are_evaluated(cli: Run) -> None:
     assert "joint.1:1" in out
 
 
-@pytest.mark.soak
-def test_twenty_independent_turns_reach_the_sum_of_their_optima() -> None:
-    # Each pose has its own turn, so the optimum is that of every pose alone.
-    assert pytest.approx(1.867166, abs=1e-6) == solve(load_case(str(_DATA / "twenty-turns.toml"))).F
+def test_twenty_independent_turns_reach_the_mean_of_their_optima() -> None:
+    # Each pose has its own turn, so the optimum is that of every pose alone: sampled here, with own kinematics.
+    tables = tomllib.loads((_DATA / "twenty-turns.toml").read_text())
+    push, limits = np.array(tables["task"][0]["axis"]), tables["limits"]["leg_length"]
+    optima = []
+    for pose in tables["pose"]:
+        (placed,) = pose["displacements"]
+        low, high = -75.0, 75.0
+        for _ in range(3):
+            turns = np.radians(np.linspace(low, high, 20_001))
+            c, s, zero = np.cos(turns), np.sin(turns), np.zeros_like(turns)
+            spun = np.moveaxis(np.array([[c, -s, zero], [s, c, zero], [zero, zero, zero + 1]]), 2, 0)
+            struts = placed["translation"] + PLATFORM @ np.swapaxes(placed["rotation"] @ spun, 1, 2) - BASE
+            lengths = np.linalg.norm(struts, axis=2)
+            F = np.sum((struts @ push / lengths) ** 2, axis=1)
+            F[~((lengths >= limits["min"]) & (lengths <= limits["max"])).all(axis=1)] = -np.inf
+            best, step = np.degrees(turns[F.argmax()]), (high - low) / 20_000
+            low, high = max(best - 2 * step, -75.0), min(best + 2 * step, 75.0)
+        optima.append(F.max())
+    found = solve(load_case(str(_DATA / "twenty-turns.toml"))).F
+    assert np.mean(optima) == pytest.approx(1.867195, abs=1e-6)
+    assert found == pytest.approx(np.mean(optima), abs=1e-8)

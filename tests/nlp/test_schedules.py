@@ -13,7 +13,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from builders import Run
+from builders import Run, docs_script
 
 from screwsynth.models import FloatArray
 from screwsynth.nlp import CaseError, load_case, solve
@@ -163,7 +163,9 @@ def test_ipopt_alone_stays_on_another_ridge(yaw: Case) -> None:
 def test_worst_value_has_no_gain(tmp_path: Path, cli: Run) -> None:
     code, out, _ = cli("solve", str(_written(tmp_path, ('as = "mean"', 'as = "worst"'))))
     assert code == 0
-    assert "worst F = 1.375807 along 199 segments (best constant turn 1.375807, no gain)" in " ".join(out.split())
+    assert "worst F = 1.375807 (in/in)² along 199 segments (best constant turn 1.375807, no gain)" in " ".join(
+        out.split()
+    )
 
 
 def test_longest_strut(tmp_path: Path) -> None:
@@ -180,6 +182,56 @@ def test_longest_strut(tmp_path: Path) -> None:
     )
     assert longest == pytest.approx(schedule.value, abs=1e-8)
     assert schedule.F.max() == pytest.approx(longest, abs=1e-8)
+
+
+def test_struts_that_need_the_motion_are_proved_along_their_schedule(tmp_path: Path, cli: Run) -> None:
+    """The shipped case has struts of 41 in: its schedule is proved, and the best constant turn, -3.6, is refuted."""
+    table = tmp_path / "struts.csv"
+    code, out, _ = cli("solve", "hexapod-struts", "--schedule", str(table))
+    words = " ".join(out.split())
+    assert code == 0
+    assert "longest leg = 40.7937" in words
+    assert "(no constant turn keeps the limits)" in words
+    with table.open() as text:
+        turns = [float(row["turn"]) * _DEGREE for row in csv.DictReader(text)]
+    angles, positions = _circle(200)
+    longest = max(
+        np.linalg.norm(_struts(a, p, s, 40), axis=1).max() for a, p, s in zip(angles, positions, turns, strict=True)
+    )
+    assert longest == pytest.approx(40.7938, abs=1e-3)
+    code, out, _ = cli("path", "hexapod-struts", "--along", str(table))
+    assert code == 0
+    assert "PROVED at every point: no singularity, 12 limits satisfied" in " ".join(out.split())
+    # Of all constant turns, the best leaves struts of 41.37 in.
+    constants = np.radians(np.linspace(-75, 75, 1501))
+    worst = [
+        max(
+            np.linalg.norm(_struts(a, p, s, 40), axis=1).max() for a, p in zip(angles[::2], positions[::2], strict=True)
+        )
+        for s in constants
+    ]
+    assert np.degrees(constants[np.argmin(worst)]) == pytest.approx(-3.6, abs=0.3)
+    assert min(worst) == pytest.approx(41.3719, abs=2e-3)
+    code, out, _ = cli("path", "hexapod-struts", "--set", "turn=-3.6")
+    assert code == 1
+    assert "leg_length limb 3- exceeds 41 in" in " ".join(out.split())
+
+
+def test_the_shipped_paths_are_the_written_ones() -> None:
+    script = docs_script("circles")
+    for name, lean in script.LEANS.items():
+        table = _YAW.with_name(f"{name}.csv").read_text()
+        assert script.table(lean) == table, "run `make docs`"
+        angles, positions = _circle(200)
+        rows = np.array([[float(each) for each in line.split(",")] for line in table.splitlines()[1:]])
+        np.testing.assert_allclose(rows[:, 0], 5 * angles, atol=1e-11)
+        np.testing.assert_allclose(rows[:, 1:4], positions, atol=1e-11)
+        w, x, y, z = rows[:, 4:].T
+        axes = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
+        s, c = math.sin(lean * _DEGREE), math.cos(lean * _DEGREE)
+        np.testing.assert_allclose(
+            axes, np.stack([s * np.cos(angles), s * np.sin(angles), c + 0 * angles], axis=1), atol=1e-11
+        )
 
 
 def test_longest_strut_below_the_least_has_no_schedule(tmp_path: Path, cli: Run) -> None:
@@ -356,9 +408,10 @@ def _refusal(cli: Run, *arguments: str) -> str:
 
 
 def test_commands_refuse_what_they_cannot_do(tmp_path: Path, cli: Run) -> None:
-    two = str(_written(tmp_path, _PER_PATH))
-    assert "certify: bounds schedules of one changing number; this case has 2" in _refusal(
-        cli, "solve", two, "--certify"
+    own = ("x1 = 26.5", 'x1 = { min = 18, max = 34, per = "path", rate = 0.5 }')
+    three = str(_written(tmp_path, _PER_PATH, own))
+    assert "certify: bounds schedules of at most two changing numbers; this case has 3" in _refusal(
+        cli, "solve", three, "--certify"
     )
     assert "turn changes along the path, but this command takes one robot" in _refusal(cli, "evaluate", str(_YAW))
     free = str(_written(tmp_path, ("x1 = 26.5", "x1 = { min = 20, max = 30 }")))
@@ -472,14 +525,13 @@ def test_report_has_map_and_points_of_the_schedule(tmp_path: Path, cli: Run) -> 
     segments = re.search(r"along (\d+) segments", words)
     assert segments is not None
     assert points[points.index("<tbody") : points.index("</tbody")].count("<tr") == int(segments[1]) + 1
-    for each in ("its robot changes along the path", "a motion that follows the feed", "best constant turn"):
+    for each in ("a translation along the feed at each point", "best constant turn"):
         assert each in words
 
 
 @pytest.mark.parametrize(
     "words",
     [
-        ("view", "--no-open", "--out", "page.html"),
         ("evaluate",),
         ("certify",),
         ("sweep", "--over", "x1=20:30:3", "--out", "sweep.csv"),
@@ -487,6 +539,7 @@ def test_report_has_map_and_points_of_the_schedule(tmp_path: Path, cli: Run) -> 
         ("pareto", "--goal", "max F", "--goal", "min limits.leg_length.max"),
         ("compare", "case", "6-ups"),
         ("export", "--format", "mjcf", "--out", "files"),
+        ("workspace",),
     ],
     ids=lambda words: words[0],
 )

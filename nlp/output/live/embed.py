@@ -13,13 +13,14 @@ from ...results.result import result_of
 from ...results.tradeoff import TradeoffResult
 from ...solver.certified import Certified
 from ...solver.solution import Solution
-from ...view.source import view_source, view_without_solver
+from ...view.source import view_or_drawing
 from ..files import check_target, write_bytes
 from ..pictures.requirements import check_library
 from ..report.markup import LiveView, Markup, join_markup, no_live_view, tag
 from ..report.report import report_of
 from ..report.webpage import page_of
 from .page import SCRIPTS, LiveParts, live_parts, script_text
+from .schedule import schedule_parts
 
 _WRITTEN = "# Case file written by Case.to_toml().\n"
 _NO_CASE_FILE = "No case file can represent this case: "
@@ -53,14 +54,10 @@ def live_view_of(solution: Solution, command: str) -> LiveView:
         command: name of the case on the command line.
     """
     case = solution.chosen_case
-    if solution.case.over_path is not None:
-        return no_live_view("its robot changes along the path")
     try:
-        source = view_source(case)
-    except CaseError as error:
-        source = view_without_solver(case, error)
-    try:
-        return embedded(live_parts(source, solution, command))
+        if solution.case.over_path is not None:
+            return embedded(schedule_parts(solution, command))
+        return embedded(live_parts(view_or_drawing(case), solution, command))
     except InputError as error:
         return no_live_view(str(error))
 

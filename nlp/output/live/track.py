@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from ....models import axis_angle_from_matrix
 from ...case.case import Case
-from ...case.pose import Free, Rotation
 from ...errors import CaseError, InputError
-from ...program.nlp import Nlp
-from ...program.places import FreeRotation
 from ...results.path import PathVerdictData
 from ...view.source import ViewSource, view_source
 from ..pictures.pathpanels import PathPanel, PathPicture
@@ -22,13 +18,10 @@ from ..report.path import path_page
 from ..report.pathview import PathView, path_view
 from .embed import embedded
 from .page import Track, live_parts
+from .posing import HALF_TURN, pose_places, with_free_pose
 
-#: Room around the path in its box of positions, as a fraction of the robot's size, and of the rotations, radians.
-_ROOM, _TURN = 0.05, 0.2
 #: Room beyond the range of a coordinate in its bars, as a fraction of the range.
 _BAR_ROOM = 0.05
-#: Largest rotation, radians: the page's variables are smooth below half a turn.
-_HALF_TURN = math.pi - 0.01
 
 
 def live_path_page(
@@ -51,7 +44,10 @@ def live_path_page(
 
 
 def _live_view(picture: PathPicture, view: PathView, name: str) -> LiveView:
-    """Return the live view along a path; without C for the case, the reason."""
+    """Return the live view along a path; the reason without C for the case, or if dimensions change along the path."""
+    if moving := picture.judged.path.settings.names:
+        names = " and ".join(map(picture.judged.case.parameter_name, moving))
+        return no_live_view(f"it does not move {names} along a path")
     try:
         source = view_source(_case_along(picture, view))
         parts = live_parts(source, None, name, _track(picture, view, source))
@@ -62,26 +58,11 @@ def _live_view(picture: PathPicture, view: PathView, name: str) -> LiveView:
 
 def _case_along(picture: PathPicture, view: PathView) -> Case:
     """Return the case with the poses of the path as its range, at one pose, and without the path."""
-    case, poses = picture.judged.case, picture.samples.poses
-    room = _ROOM * view.data["size"]
-    position = [
-        Free(float(low) - room, float(high) + room)
-        for low, high in zip(poses.positions.min(axis=0), poses.positions.max(axis=0), strict=True)
-    ]
-    largest = max(axis_angle_from_matrix(each).angle for each in poses.rotations) + _TURN
-    if largest > _HALF_TURN:
-        raise InputError("the path turns the platform by half a turn or more")
-    rotation = Rotation(axis=None, angle=Free(-largest, largest))
-    return replace(
-        case,
-        position=position,
-        rotation=rotation,
-        displacements=case.displacements[:1],
-        further=(),
-        workspace=None,
-        path=None,
-        worst_everywhere=False,
-    )
+    poses = picture.samples.poses
+    largest = max(axis_angle_from_matrix(each).angle for each in poses.rotations)
+    if largest >= HALF_TURN:
+        raise InputError("the path turns the platform by half a turn")
+    return with_free_pose(picture.judged.case, poses.positions, largest, view.data["size"])
 
 
 def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
@@ -90,7 +71,7 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
     joints = samples.joints
     if joints is None:
         raise InputError("the joint coordinates along the path are not known")
-    places = _places(nlp)
+    places = pose_places(nlp)
     inner = nlp.program.places.unknowns[0]
     frames = []
     x = nlp.start.copy()
@@ -122,15 +103,6 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
         for panel in picture.panels
     ]
     return Track(x, {**shown, "places": [*places, *inner], "frames": frames, "panels": panels})
-
-
-def _places(nlp: Nlp) -> list[int]:
-    """Return the indices in ``x`` of position and rotation: three coordinates, then the quaternion's vector part."""
-    numbers = dict(zip(nlp.case.scalars, nlp.program.places.numbers, strict=True))
-    (rotation,) = nlp.program.places.rotations
-    if not isinstance(rotation, FreeRotation):
-        raise InputError("the rotation of the platform has no variables")
-    return [*(numbers[f"p_{letter}"].index for letter in "xyz"), *rotation.q]
 
 
 def _scale(panel: PathPanel) -> dict[str, float]:

@@ -20,6 +20,7 @@ from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
 from ...results.path import PathResult, PathVerdictData
+from ...results.pathtable import path_settings, settings_at
 from ...words.claims import CLAIM_WORDS
 from ...words.numbers import key_words, number
 from ...words.path import checked_claims
@@ -40,6 +41,8 @@ _LINES = 6
 #: Factors on the typical size and on the largest limit above which curves of forces and speeds have gaps: near singular
 #: poses they would hide all other values.
 _MOST, _BEYOND, _PAST = 95, 10.0, 3.0
+#: Dimensions of the rates of settings.
+_RATES = {Dimension.LENGTH: Dimension.SPEED, Dimension.ANGLE: Dimension.TURN_SPEED}
 #: Smallest drawn margin, percent.
 _LEAST_MARGIN = -100.0
 
@@ -72,6 +75,7 @@ class PathPanel(NamedTuple):
         is_coordinate: True for coordinates of actuators, False for their forces and speeds.
         is_speed: True for speeds, which only segments with a time have.
         is_lower: True if the only limit is a lower one.
+        is_setting: True if the only curve is a setting of the path, or its rate, instead of curves of actuators.
     """
 
     title: str
@@ -82,6 +86,7 @@ class PathPanel(NamedTuple):
     is_coordinate: bool = False
     is_speed: bool = False
     is_lower: bool = False
+    is_setting: bool = False
 
     @property
     def label(self) -> str:
@@ -197,7 +202,12 @@ def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) ->
     """Return the content of the charts of a judged path."""
     way = progress_of(judged.path)
     units = {ProgressKind.TIME: ", s", ProgressKind.LENGTH: f", {judged.case.units.length}", ProgressKind.SEGMENTS: ""}
-    panels = (*_coordinates(judged, samples), *_speeds(judged, samples), *_forces(judged, samples))
+    panels = (
+        *_settings(judged, samples),
+        *_coordinates(judged, samples),
+        *_speeds(judged, samples),
+        *_forces(judged, samples),
+    )
     least = 100 * samples.least if len(samples.keys) else np.zeros(0)
     return PathPicture(
         judged,
@@ -211,6 +221,23 @@ def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) ->
         tuple(_marks(result, way)),
         tuple(_bands(samples, result, way)),
     )
+
+
+def _settings(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
+    """Yield a chart of each value that changes along the path and, with times, a chart of its rate."""
+    path, units = judged.path, judged.case.units
+    values, changes = settings_at(path, *samples.points)
+    rates = changes / path.durations[samples.points.segments, None]
+    for k, (name, dimension) in enumerate(path_settings(judged.case, path)):
+        if not np.ptp(values[:, k]):
+            continue
+        rate = _RATES.get(dimension, Dimension.NUMBER)
+        factor, speed = (units.shown(1.0, each) for each in (dimension, rate))
+        curve = PathCurve(name, k, factor * values[:, k])
+        yield PathPanel(name, units.label(dimension), (curve,), (), is_setting=True)
+        if path.is_timed:
+            curve = PathCurve(name, k, speed * rates[:, k])
+            yield PathPanel(f"rate of {name}", units.label(rate) or "1/s", (curve,), (), is_setting=True)
 
 
 def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
@@ -328,7 +355,7 @@ def marks_text(marks: Sequence[PathMark]) -> str:
 
 def actuator_names(picture: PathPicture) -> dict[int, str]:
     """Return the names of the actuators with curves, by index."""
-    return {each.place: each.name for panel in picture.panels for each in panel.curves}
+    return {each.place: each.name for panel in picture.panels if not panel.is_setting for each in panel.curves}
 
 
 def percent(margin: float) -> str:

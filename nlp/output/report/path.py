@@ -209,12 +209,13 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     at = picture.at[shown].tolist()
     count = len(ACTUATOR_COLOURS)
     names, strips = actuator_names(picture), dict[int, list[Curve]]()
+    names = {each.place: "" for each in panel.curves} if panel.is_setting else names
     for each in panel.curves:
         kind = f"curve a{each.place % count}{' other' * each.is_other}"
         strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
     ends = f"{every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else "no known value"
-    named = [Strip(f"actuator {names[place]}", curves) for place, curves in strips.items()]
+    named = [Strip(f"actuator {names[place]}".strip(), curves) for place, curves in strips.items()]
     return _chart(picture, named, (panel.title, ends), panel.unit, panel.limits)
 
 

@@ -20,6 +20,7 @@ from ...words.lines import (
     costliest_words,
     counted,
     evidence_lines,
+    followed_words,
     headline,
     is_unasked_singularity,
     relaxation_sentences,
@@ -265,9 +266,7 @@ def _objective_lines(case: Case) -> Iterator[str]:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        motion = (
-            f"motion that follows the {task.follows}" if task.follows else task_words(task_data(case, k), case.units)
-        )
+        motion = followed_words(task) if task.follows else task_words(task_data(case, k), case.units)
         yield f"Task “{task.name}”: F {word} for a {motion}."
     yield "F is the sum of the squared rates at which the limbs' unit wrenches do work in the task's motion."
 
