@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from itertools import groupby
 
 from ...case.case import Case
+from ...case.pose import ends_of
 from ...results.parts import VersionsData
 from ...words.numbers import key_words, number, spaced
 from ...words.tables import origin_table
@@ -35,14 +36,16 @@ def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> M
 
 
 def dimensions_table(case: Case) -> Markup:
-    """Return the table of the robot's dimensions, which are fixed."""
+    """Return the table of the robot's dimensions: fixed values, and ranges of values that change along a path."""
     rows = []
-    every = iter(case.fixed_parameters("the page has fixed dimensions").tolist())
     for item in case.model.parameters:
-        names = case.component_names(item)
-        values = [case.units.shown(next(every), item.dimension) for _ in names]
-        largest, unit = max(map(abs, values)), case.units.label(item.dimension)
-        rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
+        values = [
+            [case.units.shown(end, item.dimension) for end in ends_of(each)] for each in case.components(item.name)
+        ]
+        largest, unit = max(abs(end) for ends in values for end in ends), case.units.label(item.dimension)
+        for name, (low, high) in zip(case.component_names(item), values, strict=True):
+            text = number(low, largest)
+            rows.append((name, text if low == high else f"{text} to {number(high, largest)}", unit))
     table = TextTable(("", "value", "unit"), tuple(rows), "dimensions", with_unit=(1,))
     return html_table(table, "Dimensions", id="dimensions")
 
