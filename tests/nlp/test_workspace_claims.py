@@ -380,7 +380,7 @@ def test_a_box_has_the_limit_that_is_violated_first(limited: Path) -> None:
     assert (own <= begins.min(axis=0) + 3).all()
     assert len(set(each.binding[chosen].tolist())) > 2
     words = [kind.words for kind in slices_legend(case, [each])]
-    assert "violated: leg_length.max = 34 in" in words
+    assert "violated: maximum leg length = 34 in" in words
 
 
 @pytest.fixture(scope="module")
