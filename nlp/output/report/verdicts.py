@@ -51,8 +51,13 @@ def dimensions_table(case: Case) -> Markup:
 
 def refuting_place(claim: str, pose: str, command: str) -> Markup:
     """Return a violated claim with its pose, and the command that shows the pose."""
+    return join_markup([tag("h3", in_words(claim)), tag("p", f"At {pose}."), shown_command(command)])
+
+
+def in_words(claim: str) -> str:
+    """Return a claim with its quantity and its limit in words, for a heading or a caption."""
     name, space, rest = key_words(claim).partition(" ")
-    return join_markup([tag("h3", f"{spaced(name)}{space}{rest}"), tag("p", f"At {pose}."), shown_command(command)])
+    return f"{spaced(name)}{space}{rest}"
 
 
 def shown_command(command: str) -> Markup:
