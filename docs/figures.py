@@ -1,9 +1,9 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters; slices of workspaces, a path, and a schedule along a path; the gallery of robots given joint
-by joint on one sheet, the Delta of robots.md, the optimum of README.md, and the leg, wrench and task of the method in
-formulation.md.
+robots with their parameters; slices of workspaces, a path, and a schedule along a path; the gallery of robots given
+joint by joint on one sheet, the Delta of robots.md, the optimum of README.md, and the leg, wrench and task of the
+method in formulation.md.
 """
 
 import re

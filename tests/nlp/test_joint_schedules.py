@@ -419,4 +419,4 @@ def test_the_example_of_the_page(tmp_path: Path) -> None:
     assert schedule is not None
     assert schedule.constant is not None
     value, constant = (f"{each:.7g}" for each in (schedule.value, schedule.constant.value))
-    assert f"mean F = {value} along 192 segments (best constant joint.1:1 {constant}, " in part
+    assert f"mean F = {value} along 192 segments ({constant} with the best constant joint.1:1, " in part
