@@ -49,10 +49,10 @@ def _parts_of(name: str, head: str, body: Sequence[str]) -> list[str]:
         first, own = set[str](), set[str]()
         for line in part:
             made = _ASSIGNMENT.match(line)
-            found = made or _RESULT.match(line)
-            if found is None:
+            match = made or _RESULT.match(line)
+            if match is None:
                 return []
-            first |= set(_VARIABLE.findall(found.group(2 if made else 1))) - own
+            first |= set(_VARIABLE.findall(match.group(2 if made else 1))) - own
             if made:
                 own.add(made.group(1))
         read.append(first)
