@@ -163,7 +163,7 @@ def test_ipopt_alone_stays_on_another_ridge(yaw: Case) -> None:
 def test_worst_value_has_no_gain(tmp_path: Path, cli: Run) -> None:
     code, out, _ = cli("solve", str(_written(tmp_path, ('as = "mean"', 'as = "worst"'))))
     assert code == 0
-    assert "worst F = 1.375807 (in/in)² along 199 segments (best constant turn 1.375807, no gain)" in " ".join(
+    assert "worst F = 1.375807 (in/in)² along 199 segments (1.375807 with the best constant turn, no gain)" in " ".join(
         out.split()
     )
 

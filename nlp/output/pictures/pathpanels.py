@@ -234,9 +234,7 @@ def _settings(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
         rate = _RATES.get(dimension, Dimension.NUMBER)
         factor, speed = (units.shown(1.0, each) for each in (dimension, rate))
         curve = PathCurve(name, k, factor * values[:, k])
-        yield PathPanel(
-                f"setting {name}", units.label(dimension), (curve,), (), is_coordinate=True, is_setting=True
-            )
+        yield PathPanel(f"setting {name}", units.label(dimension), (curve,), (), is_coordinate=True, is_setting=True)
         if path.is_timed:
             curve = PathCurve(name, k, speed * rates[:, k])
             yield PathPanel(f"rate of {name}", units.label(rate) or "1/s", (curve,), (), is_setting=True)
