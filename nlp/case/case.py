@@ -343,6 +343,8 @@ class Case(Whole, Shown):
             values = [value for value in self.components(item.name) if not isinstance(value, Free)]
             if len(values) < len(item.typical):
                 fault = f"is free, and {reason}: give it with --set, or a result with --of"
+                if set(self.component_names(item)) & self.settings.keys():
+                    fault = f"changes along the path, and {reason}: give it with --set"
                 raise CaseError(f"robot.parameters.{item.name}", fault, source=self.source)
             found += values
         return np.array(found, dtype=np.float64)
