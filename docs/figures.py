@@ -1,8 +1,9 @@
 """Draw the pictures of the documentation: run by ``make figures``.
 
 The paper's Figs. 4, 5, 7, 8, 10 and 11 from their cases, the hexapod with limits, the worked design problems, and the
-robots with their parameters; slices of a workspace and a path; the gallery of robots given joint by joint on one sheet,
-the Delta of robots.md, the optimum of README.md, and the leg, wrench and task of the method in formulation.md.
+robots with their parameters; slices of workspaces, a path, and a schedule along a path; the gallery of robots given
+joint by joint on one sheet, the Delta of robots.md, the optimum of README.md, and the leg, wrench and task of the
+method in formulation.md.
 """
 
 import re
@@ -22,6 +23,7 @@ from screwsynth.nlp.output.pictures.figures import picture_of
 from screwsynth.nlp.output.pictures.painting import Panel
 from screwsynth.nlp.output.pictures.pathpanels import path_picture
 from screwsynth.nlp.output.pictures.paths import path_figure
+from screwsynth.nlp.output.pictures.schedules import schedule_figure
 from screwsynth.nlp.output.pictures.solutions import drawings_of
 from screwsynth.nlp.output.pictures.view import clearest_view
 from screwsynth.nlp.output.pictures.workspaces import slices_figure
@@ -198,6 +200,12 @@ for name in SLICED:
     (FOLDER / f"{name}.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
 for name in SOLVED:
     plot(solve(load_case(name)), FOLDER / f"{name}.png")
+machine = load_case("hexapod-base-slides")
+policy = solve(machine)
+machine = machine.replace({"x1": policy["x1"], "x1_slope": [policy[f"x1_slope_{axis}"] for axis in "xyz"]})
+(FOLDER / "hexapod-base-slides.png").write_bytes(picture_of(".png", slices_figure, machine, slices_of(machine)))
+machine = load_case("hexapod-yaw")
+(FOLDER / "hexapod-yaw.png").write_bytes(picture_of(".png", schedule_figure, machine, solve(machine)))
 machine = load_case("hexapod-linuxcnc")
 program = read_program(path_of_page("paths.md").splitlines(), "part.ngc", machine.units, PathOptions())
 judged = judge_path(machine, program)

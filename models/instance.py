@@ -21,7 +21,7 @@ from casadi import SX
 from .arrays import FloatArray
 from .limbjoints import LimbJoint, LimbLink
 from .member import Member, resistance
-from .model import Model
+from .model import Model, joint_parameter
 from .parts import Actuator, Closure, Dimension, Unknown, rate_relations
 from .values import dataclass
 from .whole import expressions_of, with_expressions
@@ -228,6 +228,22 @@ def length_of(model: Model, values: Sequence[float]) -> float:
     function = ca.Function("size", [Substitution.identity(model).parameters], [ca.densify(_size_of(model))])
     found = float(function(list(values)))
     return found if 0 < found < np.inf else float(np.linalg.norm(model.home)) or 1.0
+
+
+def joint_sizes(model: Model) -> FloatArray:
+    """Return the sizes (d,) of the joint coordinates among a model's parameters; 0 for its dimensions.
+
+    These coordinates are 0 at home, so a test of expressions at random values needs their sizes.
+    """
+    names, size = [joint_parameter(label) for label in model.locked], length_of(model, model.typical.tolist())
+    return np.array(
+        [
+            (size if item.dimension is Dimension.LENGTH else 1.0) * (item.name in names)
+            for item in model.parameters
+            for _ in item.typical
+        ],
+        dtype=np.float64,
+    )
 
 
 def _size_of(model: Model) -> SX:

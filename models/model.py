@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field, fields
+from dataclasses import field, fields, replace
 from types import MappingProxyType
 
 import casadi as ca
@@ -76,6 +76,8 @@ class Model(Whole, Shown):
         length_unit: unit of the typical lengths, such as ``m``; empty for proportions in any unit.
         size: (1, 1) characteristic size of the robot, length; None for the norm of the parameters that are lengths.
         settings: parameters that follow the pose, see :mod:`.posesettings`; empty for a robot as its function made it.
+        locked: labels of the actuated joints with free coordinates that are parameters, see
+            :meth:`with_joints_as_parameters`; empty for a robot as its function made it.
 
     Raises:
         ModelError: an expression uses a symbol that is not declared, a name or symbol appears twice, a shape is wrong,
@@ -110,6 +112,7 @@ class Model(Whole, Shown):
     length_unit: str = ""
     size: SX | None = None
     settings: tuple[PoseSetting, ...] = ()
+    locked: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "options", MappingProxyType(dict(self.options)))
@@ -166,9 +169,49 @@ class Model(Whole, Shown):
         return tuple(each.joint for each in self.unknowns if each.is_free)
 
     @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Labels of the actuated joints that the pose does not determine: unknowns, or parameters for a path."""
+        return (*self.locked, *self.free_joints)
+
+    def with_joints_as_parameters(self) -> Model:
+        """Return the robot with its free actuator coordinates as parameters, which are 0 at home.
+
+        Loop equations then determine all remaining unknowns from parameters and pose. Wrenches, and so F, are those
+        with locked actuators, as before.
+        """
+        free = [each for each in self.unknowns if each.is_free]
+        more = (
+            Parameter(
+                joint_parameter(each.joint), each.symbol, each.dimension, f"coordinate of joint {each.joint}", (0.0,)
+            )
+            for each in free
+        )
+        return replace(
+            self,
+            parameters=(*self.parameters, *more),
+            unknowns=tuple(each for each in self.unknowns if not each.is_free),
+            structure=_without_free(self),
+            locked=(*self.locked, *(each.joint for each in free)),
+        )
+
+    @property
     def has_couples(self) -> bool:
         """True if F depends on the characteristic length, because a row has a couple that does work."""
         return any(row.kind is not WrenchKind.FORCE for row in self.rows)
+
+
+def joint_parameter(label: str) -> str:
+    """Return the name of the parameter or variable of a free actuator coordinate, by the label of its joint."""
+    return f"joint.{label}"
+
+
+def _without_free(model: Model) -> tuple[PathStructure, ...]:
+    """Return the chains of a robot, which have its unknowns in order, without the free actuator coordinates."""
+    unknowns, found = iter(model.unknowns), list[PathStructure]()
+    for each in model.structure:
+        own = [next(unknowns) for _ in range(each.unknowns)]
+        found.append(replace(each, unknowns=sum(not unknown.is_free for unknown in own)))
+    return tuple(found)
 
 
 def _model_error(model: Model, fault: str) -> ModelError:

@@ -1,4 +1,4 @@
-"""Rotation matrices: symbolic from three sets of coordinates, and numeric to axis and angle.
+"""Rotation matrices: symbolic from three sets of coordinates, and numeric to axis and angle, and to quaternions.
 
 The vector part ``q`` of a unit quaternion is smooth without trigonometric functions for every angle below 180 degrees,
 and turns a limit on the angle into a ball, ``|q|^2 <= sin^2(angle_max / 2)``. The Cayley vector ``tan(angle / 2) n`` is
@@ -111,3 +111,25 @@ def perpendiculars(axis: FloatArray) -> FloatArray:
     first = np.cross(axis, helper)
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(axis, first)])
+
+
+def quaternion_from_matrix(R: FloatArray) -> FloatArray:
+    """Return the unit quaternion (4,), scalar part first and not negative, of a rotation matrix (3, 3).
+
+    The largest component is computed from the diagonal, and the others are divided by it, so that no digits are lost
+    (S. W. Shepperd, "Quaternion from rotation matrix", 1978).
+    """
+    squares = np.array(
+        [
+            1 + R[0, 0] + R[1, 1] + R[2, 2],
+            1 + R[0, 0] - R[1, 1] - R[2, 2],
+            1 - R[0, 0] + R[1, 1] - R[2, 2],
+            1 - R[0, 0] - R[1, 1] + R[2, 2],
+        ]
+    )
+    w, x, y = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    a, b, c = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
+    rows = np.array([[squares[0], w, x, y], [w, squares[1], a, b], [x, a, squares[2], c], [y, b, c, squares[3]]])
+    q = rows[int(np.argmax(squares))]
+    q = q / np.linalg.norm(q)
+    return np.asarray(-q if q[0] < 0 else q)

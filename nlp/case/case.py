@@ -6,7 +6,7 @@ messages in the words of case files, so that all other modules can rely on valid
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,6 +24,7 @@ from .checks import check_determined_joints, check_real, check_tolerance
 from .controller import SAME, Controller
 from .excursions import OutsideWorkspace, check_excursions, in_world, outside_workspace, refuse_free
 from .existence import assembly_fault
+from .jointsettings import check_joint_rates, with_joints_along
 from .limits.limit import Limit, LimitedCase
 from .limits.limits import Limits
 from .loads import NO_LOADING, Loading
@@ -31,7 +32,7 @@ from .names import name_of_task, parameter_name, pose_prefixes
 from .parameters import check_choices, check_parameters
 from .pathfile import TURN, PathFile
 from .pertask import Station, check_poses, common_poses, common_value, stations, task_value
-from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerPose, PerTask, Pose, Rotation, Value
+from .pose import LARGEST, NO_DISPLACEMENT, Free, OverPoses, PerPose, PerTask, Pose, Rotation, Value, ends_of
 from .posechecks import check_displacements, check_further_poses, check_position, check_rotation
 from .posesettings import check_pose_settings, with_settings_resolved
 from .radians import angles_of, check_radians, with_radians
@@ -146,7 +147,14 @@ class Case(Whole, Shown):
         )
         for name, value in resolved._asdict().items():
             store(self, name, value)
-        checked = check_parameters(resolved.parameters, self.model, len(self.tasks), self.units)
+        parameters = resolved.parameters
+        if self.over_path is None:
+            check_joint_rates(self.model, self.limits, has_path=self.path is not None)
+        else:
+            along = with_joints_along(self.model, parameters, self.limits, self.units)
+            store(self, "model", along.model)
+            parameters = along.parameters
+        checked = check_parameters(parameters, self.model, len(self.tasks), self.units)
         store(self, "parameters", MappingProxyType(checked))
         known = {} if self.dimensions_per_task else self.parameters
         if fault := assembly_fault(self.model, known, self.units):  # type: ignore[arg-type]
@@ -229,7 +237,7 @@ class Case(Whole, Shown):
 
     @property
     def dimensions_per_task(self) -> Mapping[str, PerTask]:
-        """Components of the robot's parameters that are set anew for every task, by their name in the robot."""
+        """Components of the robot's parameters that are reset for every task, by their name in the robot."""
         return {
             name: value
             for item in self.model.parameters
@@ -329,18 +337,23 @@ class Case(Whole, Shown):
             pose_per_task=self.pose_per_task and "pose" not in names,
         )
 
-    def fixed_parameters(self, reason: str) -> FloatArray:
+    def fixed_parameters(self, reason: str, changing: Collection[str] = ()) -> FloatArray:
         """Return the values (d,) of all components of the robot's parameters, in the robot's order.
 
         Args:
             reason: reason why the parameters must be fixed, as a clause for messages.
+            changing: names of components with ranges along a path; their values are the middles of the ranges.
 
         Raises:
-            CaseError: a parameter is free.
+            CaseError: another parameter is free.
         """
         found: list[float] = []
         for item in self.model.parameters:
-            values = [value for value in self.components(item.name) if not isinstance(value, Free)]
+            values = [
+                sum(ends_of(value)) / 2
+                for name, value in zip(item.components, self.components(item.name), strict=True)
+                if not isinstance(value, Free) or name in changing
+            ]
             if len(values) < len(item.typical):
                 fault = f"is free, and {reason}: give it with --set, or a result with --of"
                 if set(self.component_names(item)) & self.settings.keys():

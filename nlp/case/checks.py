@@ -55,13 +55,26 @@ def check_value(
     start = value.start
     if start is not None:
         start = _check_number(start, f"{key}.start", dimension, units, (lower, upper))
-    return Free(lower, upper, start, rate=_check_rate(value.rate, f"{key}.rate", dimension, units))
+    return Free(
+        lower,
+        upper,
+        start,
+        rate=None if value.rate is None else check_rate(value.rate, f"{key}.rate", dimension, units),
+    )
 
 
-def _check_rate(rate: float | None, key: str, dimension: Dimension, units: Units) -> float | None:
-    """Return the checked rate of a setting along a path; None without a rate."""
-    if rate is None:
-        return None
+def check_rate(rate: float, key: str, dimension: Dimension, units: Units) -> float:
+    """Return the checked rate of a setting along a path.
+
+    Args:
+        rate: largest change per second; infinite for no limit.
+        key: dotted key of the rate, for messages.
+        dimension: dimension of the setting.
+        units: units of messages.
+
+    Raises:
+        CaseError: the rate is not positive, or too large.
+    """
     number = check_real(rate, key)
     if not number > 0:
         raise CaseError(key, "must be positive, or inf for no limit", units.shown(number, dimension))

@@ -82,12 +82,21 @@ class GravityTable(Table):
 
 
 class ObjectiveTable(Table):
-    """Objective: a quantity of the actuators instead of F, or the worst F over a workspace or path."""
+    """Objective: a quantity of actuators, legs or J instead of F, or the worst F over a workspace or path."""
 
     minimise: Literal["actuator_force", "actuator_speed", "actuator_power", "leg_length"] | None = Field(
         default=None,
         description="quantity of the actuators whose largest magnitude over loads, actuators and poses is minimised; "
         "leg_length: longest leg along the path",
+    )
+    maximise: Literal["smallest_singular_value"] | None = Field(
+        default=None,
+        description="quantity that is maximised along the path: the smallest singular value of J, with moments about "
+        "the platform origin divided by length",
+    )
+    length: float | None = Field(
+        default=None,
+        description="length by which moments about the platform origin are divided; only with maximise",
     )
     over: Literal["workspace", "path"] | None = Field(
         default=None,
@@ -102,9 +111,13 @@ class ObjectiveTable(Table):
 
     @model_validator(mode="after")
     def _refuse_nothing(self) -> ObjectiveTable:
-        """Refuse a table without minimise and over."""
-        if self.minimise is None and self.over is None:
+        """Refuse a table without an objective, with two of them, or with a length that has no effect."""
+        if self.minimise is None and self.maximise is None and self.over is None:
             raise fault_of("minimise", "is missing: give minimise, over, or both")
+        if self.minimise is not None and self.maximise is not None:
+            raise fault_of("maximise", f"conflicts with minimise = {self.minimise!r}; remove one of them")
+        if self.length is not None and self.maximise is None:
+            raise fault_of("length", "has an effect only with maximise; remove it")
         return self
 
 

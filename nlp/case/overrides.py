@@ -22,6 +22,8 @@ _Place: TypeAlias = tuple[Any, int | str]
 _LIMITS = "limits."
 #: Prefix of the names of coordinates of the path's frame.
 _PLACE = "path.place."
+#: First part of the name of an actuated joint that the pose does not determine.
+_JOINT = "joint."
 #: Keys of the table of a free variable.
 ENDS = ("min", "max", "start")
 #: Further key of a value that changes along the path.
@@ -94,6 +96,10 @@ def _override_place_of_case(tables: dict[str, Any], name: str, value: float | li
         if end == RATE and RATE not in table[place]:
             raise CaseError(name, f"cannot be set: {whole} does not change along the path")
         table[place][end] = value
+        return
+    robot = tables.get("robot")
+    if name.startswith(_JOINT) and isinstance(robot, dict):
+        robot.setdefault("parameters", {})[name] = value
         return
     if name not in places:
         raise CaseError(name, f"cannot be set; {_allowed(name, tables, places, rotations)}")

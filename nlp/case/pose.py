@@ -83,7 +83,7 @@ Value: TypeAlias = float | Free
 
 @dataclass(frozen=True)
 class PerTask:
-    """Dimension that is set anew for every task, such as a pin in one of several holes.
+    """Dimension that is reset for every task, such as a pin in one of several holes.
 
     Attributes:
         values: value for each task, in the order of the tasks; a single value stands for all tasks.
@@ -109,12 +109,12 @@ class PerTask:
 
 @dataclass(frozen=True)
 class PerPose:
-    """Dimension that is set anew for every pose of the workspace, such as the base joints of a hexapod on slides.
+    """Dimension that is reset for every pose of the workspace, such as the base radius of a hexapod on slides.
 
     Attributes:
         range: range of the setting, or its catalogue values.
-        at: value in the middle of the workspace, for an affine setting; None for any value of the range.
-        slope: (3,) changes along x, y and z of the platform's position, for an affine setting; None for free slopes.
+        at: value in the middle of the workspace, for an affine setting; None if it is free within the range.
+        slope: (3,) changes along x, y and z of the platform's position, for an affine setting; None if they are free.
     """
 
     range: Free

@@ -25,6 +25,8 @@ from .workspace import PoseSettings, Workspace
 #: Limits that are evaluated once for the whole design, or whose reference is a pose with a setting of its own.
 _WITHOUT_POSE = ("joint_spacing", "footprint", "radius_ratio")
 _ABOUT_HOME = ("base_joint_angle", "platform_joint_angle")
+#: Limits that compare lengths at different poses.
+_OVER_POSES = ("actuator",)
 
 
 class Resolved(NamedTuple):
@@ -212,6 +214,14 @@ def _check_conflicts(limits: Limits, loading: Loading, tolerance: float | None, 
     """Refuse what a setting for every pose does not support."""
     if tolerance is not None:
         raise CaseError("tolerance.joint_centre", "is not supported with per = 'pose'")
+    how = "affine" if is_affine else "any"
+    for limit in limits:
+        if limit.name in _ABOUT_HOME and getattr(limit, "reference", "") == "home":
+            fault = f"must not be 'home' with settings = '{how}': the settings of the mounting pose are not stated"
+            raise CaseError(f"limits.{limit.name}.about", fault)
+        if limit.name in _OVER_POSES and not is_affine:
+            fault = "is not supported with settings = 'any': it compares poses, whose settings differ"
+            raise CaseError(f"limits.{limit.name}", fault)
     if not is_affine:
         return
     if loading.motion is not None:
@@ -223,9 +233,6 @@ def _check_conflicts(limits: Limits, loading: Loading, tolerance: float | None, 
             raise CaseError(f"limits.{limit.name}", fault)
         if limit.name in _WITHOUT_POSE:
             raise CaseError(f"limits.{limit.name}", "is not supported with settings = 'affine': it holds at one pose")
-        if limit.name in _ABOUT_HOME and getattr(limit, "reference", "") == "home":
-            fault = "must not be 'home' with settings = 'affine': the settings of the mounting pose are not stated"
-            raise CaseError(f"limits.{limit.name}.about", fault)
 
 
 def _following(model: Model, found: Sequence[_Setting], workspace: Workspace) -> Model:

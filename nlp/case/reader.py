@@ -12,6 +12,7 @@ from pydantic import ValidationError
 
 from ...models import Dimension, FloatArray, Model, unit_vector
 from ...models.fileversions import CASE_FILES
+from ...models.model import joint_parameter
 from ..errors import CaseError, nearest
 from ..system.reading import check_version
 from ..units import Units
@@ -254,6 +255,7 @@ def _case_of(
         fault = f"has no effect on {model.name!r}, which has no constraint couples; remove the key"
         raise CaseError("robot.characteristic_length", fault)
     dimensions = {parameter.name: parameter.dimension for parameter in model.parameters}
+    dimensions |= {joint_parameter(each.joint): each.dimension for each in model.unknowns if each.is_free}
     poses = written.pose if isinstance(written.pose, list) else [written.pose]
     tasks = [_task(task, index) for index, task in enumerate(written.task)]
     keys = _pose_keys(written)

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from ...models import Model
+from ...models.model import joint_parameter
 from ..errors import CaseError, listing
 from .pathfile import PathFile
 from .pose import Free, OverPoses, Rotation, Value
-from .task import FOLLOWS, LEG_LENGTH, Task
+from .task import ALONG, FOLLOWS, Task
 from .workspace import Workspace
 
 
@@ -52,10 +53,10 @@ def check_settings(case: ScheduledCase) -> None:
             fault = f'{key} changes along the path, which needs over = "path" and as = "mean" or "worst"'
             raise CaseError("objective", fault)
     for index, task in enumerate(case.tasks):
-        if task.measure == LEG_LENGTH and case.over_path is None:
-            raise CaseError("objective.minimise", 'needs over = "path" and as = "mean" or "worst"', task.measure)
+        if task.measure in ALONG and case.over_path is None:
+            raise CaseError(task.objective_key, 'needs over = "path" and as = "mean" or "worst"', task.measure)
         if task.measure and task.follows:
-            fault = f"conflicts with objective.minimise = {task.measure!r}, which needs no motion; remove [[task]]"
+            fault = f"conflicts with {task.objective_key} = {task.measure!r}, which needs no motion; remove [[task]]"
             raise CaseError(f"task[{index}].follows", fault, task.follows)
         if task.follows:
             _check_follows(case, f"task[{index}].follows", task.follows)
@@ -65,13 +66,15 @@ def check_settings(case: ScheduledCase) -> None:
 
 def _keys(case: ScheduledCase) -> Iterator[str]:
     """Yield the dotted key of each setting."""
+    locked = [joint_parameter(label) for label in case.model.locked]
     for item in case.model.parameters:
         values = case.components(item.name)
         for k, value in enumerate(values):
             if isinstance(value, Free) and value.rate is not None:
                 if item.is_direction:
                     raise CaseError(f"robot.parameters.{item.name}", "cannot change along the path: it is a direction")
-                yield f"robot.parameters.{item.name}{f'[{k}]' if len(values) > 1 else ''}"
+                key = f"robot.parameters.{item.name}{f'[{k}]' if len(values) > 1 else ''}"
+                yield key if item.name not in locked else f"limits.{item.name}"
     if case.path is not None and case.path.tool is not None and isinstance(case.path.tool.turn, Free):
         yield "path.tool.turn"
 

@@ -55,7 +55,7 @@ class DimensionRange(Range):
 
     per: Literal["task", "path", "pose"] | None = Field(
         default=None,
-        description="task: the dimension is set anew for every task; path: it changes along the tool path; pose: it is "
+        description="task: the dimension is reset for every task; path: it changes along the tool path; pose: it is "
         "set for every pose of the workspace; the same value everywhere if left out",
     )
     rate: float | None = Field(
@@ -573,16 +573,19 @@ class Document(Table):
         return None
 
     def read_tasks(self, tasks: Sequence[Task]) -> list[Task]:
-        """Return the tasks of the case; with ``objective.minimise``, a quantity of the actuators replaces F.
+        """Return the tasks of the case; with ``objective.minimise`` or ``maximise``, a quantity replaces F.
 
         Args:
             tasks: tasks that the document states.
         """
-        if self.objective is None or self.objective.minimise is None:
+        measure = None if self.objective is None else self.objective.minimise or self.objective.maximise
+        if self.objective is None or measure is None:
             return list(tasks)
+        length = self.objective.length
         if not tasks:
-            return [Task.minimise(self.objective.minimise)]
-        return [replace(task, measure=self.objective.minimise) for task in tasks]
+            task = Task.minimise(measure) if self.objective.maximise is None else Task.maximise(measure, length=length)
+            return [task]
+        return [replace(task, measure=measure, length=length) for task in tasks]
 
     def read_loading(self, units: Units) -> Loading:
         """Return loads, motion, gravity and actuator stiffness of the document.

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 MEASURES = {"actuator_force": (True, False), "actuator_speed": (False, True), "actuator_power": (True, True)}
 #: Name of the longest leg along a path as objective, which needs neither loads nor motions.
 LEG_LENGTH = "leg_length"
+#: Name of the smallest singular value of the homogenised J along a path as objective, likewise.
+SMALLEST = "smallest_singular_value"
+#: Objectives that exist along a path only.
+ALONG = (LEG_LENGTH, SMALLEST)
 #: Motions that move with a tool path.
 FOLLOWS = ("feed", "tool", "thrust")
 
@@ -45,10 +49,11 @@ class Task:
         name: name of the task.
         weight: positive weight of the task in a combination of several tasks.
         point: (3,) point of the screw axis as stated, length; None for a translation, or for a task given as a twist.
-        measure: quantity of the actuators that is minimised instead of F, such as ``actuator_force``; empty for F.
+        measure: quantity that is optimised instead of F, such as ``actuator_force``; empty for F.
         is_stated: If true, the case states the motion; if false, the twist is a placeholder of an objective without F.
         follows: motion that moves with the tool path of the case: ``"feed"``, ``"tool"`` or ``"thrust"``; the twist is
             then a placeholder. Empty for a fixed motion.
+        length: length by which moments are divided, if the measure is the smallest singular value; otherwise None.
     """
 
     twist: ArrayLike
@@ -59,6 +64,7 @@ class Task:
     measure: str = ""
     is_stated: bool = True
     follows: str = ""
+    length: float | None = None
 
     @classmethod
     def minimise(cls, measure: str) -> Task:
@@ -71,6 +77,22 @@ class Task:
         return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, measure, measure=measure, is_stated=False)
 
     @classmethod
+    def maximise(cls, measure: str, *, length: float | None) -> Task:
+        """Return an objective along a path that maximises the smallest singular value of the homogenised J.
+
+        Args:
+            measure: ``"smallest_singular_value"``.
+            length: length by which moments about the platform origin are divided.
+        """
+        twist = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return cls(twist, Sense.MAX, measure, measure=measure, is_stated=False, length=length)
+
+    @property
+    def objective_key(self) -> str:
+        """Dotted key of the measure in a case file."""
+        return f"objective.{'maximise' if self.measure == SMALLEST else 'minimise'}"
+
+    @classmethod
     def following(cls, motion: str, *, sense: Sense | str = "max", name: str = "task", weight: float = 1.0) -> Task:
         """Return the task of a unit motion that moves with the tool path of the case.
 
@@ -81,7 +103,9 @@ class Task:
             name: name of the task.
             weight: positive weight of the task in a combination of several tasks.
         """
-        return cls((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense(sense), name, weight, follows=motion)
+        # The kind of the placeholder, a rotation or a translation, determines the unit of F.
+        twist = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0) if motion == "tool" else (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return cls(twist, Sense(sense), name, weight, follows=motion)
 
     @classmethod
     def screw(

@@ -12,10 +12,10 @@ from ...models import Model, frozen_array
 from ...models.statics import driven_joints
 from ..errors import CaseError, listing
 from ..units import Units
-from .checks import check_real, check_reals, check_statics, check_vector
+from .checks import check_real, check_reals, check_size, check_statics, check_vector
 from .loads import Loading
 from .pose import LARGEST
-from .task import LEG_LENGTH, MEASURES, Sense, Task
+from .task import ALONG, MEASURES, SMALLEST, Sense, Task
 
 
 def check_tasks(given: Sequence[Task], model: Model, loading: Loading) -> tuple[Task, ...]:
@@ -65,16 +65,19 @@ def _check_measure(task: Task, tasks: int, model: Model, loading: Loading) -> No
     """
     if not task.measure:
         return
-    key = "objective.minimise"
-    if task.measure not in (*MEASURES, LEG_LENGTH):
-        raise CaseError(key, f"must be one of {listing([*MEASURES, LEG_LENGTH])}", task.measure)
+    key = task.objective_key
+    if task.measure not in (*MEASURES, *ALONG):
+        raise CaseError(key, f"must be one of {listing([*MEASURES, *ALONG])}", task.measure)
     if tasks > 1:
-        fault = "must be given at most once with objective.minimise, which does not optimise the F of tasks"
+        fault = f"must be given at most once with {key}, which does not optimise the F of tasks"
         raise CaseError("task", f"{fault}, got {tasks}")
-    if task.sense is not Sense.MIN:
-        fault = 'objective.minimise needs no task: remove [[task]], or give it sense = "min"'
-        raise CaseError("task[0].sense", fault, "max")
-    if task.measure == LEG_LENGTH:
+    sense = Sense.MAX if task.measure == SMALLEST else Sense.MIN
+    if task.sense is not sense:
+        fault = f'{key} needs no task: remove [[task]], or give it sense = "{sense.value}"'
+        raise CaseError("task[0].sense", fault, task.sense.value)
+    if task.measure == SMALLEST:
+        _check_length(task.length)
+    if task.measure in ALONG:
         return  # an objective along a path, checked with it
     needs_loads, needs_motion = MEASURES[task.measure]
     if needs_loads and not loading.loads:
@@ -86,6 +89,21 @@ def _check_measure(task: Task, tasks: int, model: Model, loading: Loading) -> No
     if task.measure != "actuator_power" and len({joint.dimension for joint in joints}) > 1:
         fault = "compares all actuators, but the robot has revolute and prismatic ones; minimise actuator_power"
         raise CaseError(key, fault, task.measure)
+
+
+def _check_length(length: float | None) -> None:
+    """Refuse a missing length by which moments are divided, or one that is not positive.
+
+    Raises:
+        CaseError: the length is not allowed.
+    """
+    key = "objective.length"
+    if length is None:
+        fault = "is missing: maximise needs the length by which moments about the platform origin are divided"
+        raise CaseError(key, fault)
+    if not (math.isfinite(length) and length > 0):
+        raise CaseError(key, "must be positive", length)
+    check_size(length, key)
 
 
 def check_loading(loading: Loading, model: Model, units: Units) -> None:

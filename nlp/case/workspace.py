@@ -36,7 +36,7 @@ class TurnKind(enum.Enum):
 
 
 class PoseSettings(enum.Enum):
-    """Rules for dimensions that are set anew for every pose of a workspace."""
+    """Rules for dimensions that are reset for every pose of a workspace."""
 
     AFFINE = "affine"
     ANY = "any"
@@ -88,7 +88,7 @@ class Workspace:
             dependent coordinate is a limit; a number is the start of the search for its value.
         held: indices of independent coordinates with a fixed value; empty without dependent coordinates.
         position_set: set of positions; None for all positions of the box.
-        settings: rule for dimensions that are set anew for every pose. ``AFFINE``: affine functions of the position;
+        settings: rule for dimensions that are reset for every pose. ``AFFINE``: affine functions of the position;
             ``ANY``: any value of the range that satisfies the limits at the pose. None without such dimensions.
         setting_names: names of these dimensions, which a case adds.
 

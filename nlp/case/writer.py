@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from ...models import Dimension, FloatArray, Model, Parameter, Substitution, axis_from_screw, unit_vector
+from ...models.model import joint_parameter
 from ...models.posesettings import slope_name
 from ...models.statics import driven_joints
 from ..errors import CaseError
@@ -117,9 +118,9 @@ def _lines(case: Case) -> Iterator[str]:
         "[robot]", {"model": name, **options, "characteristic_length": length, **_stiffness(case.loading)}
     )
     parameters: dict[str, TomlValue] = {}
-    slopes = {slope_name(each.name) for each in model.settings}
+    further = {*(slope_name(each.name) for each in model.settings), *map(joint_parameter, model.locked)}
     for item in model.parameters:
-        if item.name in slopes:
+        if item.name in further and not _is_locked(case, item):
             continue
         values, stated = case.components(item.name), _stated(case, item)
         numbers = [written_dimension(value, units, item.dimension) for value in stated]
@@ -134,7 +135,8 @@ def _lines(case: Case) -> Iterator[str]:
         over = case.limits_over if case.worst_everywhere else None
         along = None if case.over_path is None else case.over_path.value
         over = "path" if along else over
-        yield from toml_table("[objective]", {"minimise": task.measure or None, "over": over, "as": along})
+        measure = {task.objective_key.partition(".")[2]: task.measure or None, "length": task.length}
+        yield from toml_table("[objective]", {**measure, "over": over, "as": along})
     yield from toml_table("[combine]", _combination(case))
     yield from _loading(case.loading, units)
     yield from toml_table("[controller]", case.controller.to_keys(driven_joints(model), units))
@@ -150,6 +152,12 @@ def _lines(case: Case) -> Iterator[str]:
     for row in case.published:
         value = row.value[0] if len(row.value) == 1 else row.value
         yield from toml_table("[[published]]", {**vars(row), "value": value, "because": row.because or None})
+
+
+def _is_locked(case: Case, item: Parameter) -> bool:
+    """Return whether a parameter is the coordinate of a joint that is locked at a stated value."""
+    is_joint = item.name in map(joint_parameter, case.model.locked)
+    return is_joint and not any(isinstance(each, Free) for each in case.components(item.name))
 
 
 def _stated(case: Case, item: Parameter) -> list[Value | PerTask | PerPose]:

@@ -69,11 +69,10 @@ def path(
     from pathlib import Path
 
     from ..case.pose import RotationForm
-    from ..errors import InputError
     from ..interruption import Milestone, answer_after
     from ..path.options import PathOptions
     from ..path.reader import options_of, path_of_case, read_path
-    from ..path.settings import changing_of, dimensions_along
+    from ..path.settings import changing_of
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
     from ..results.path import path_result, settings_at, violating_poses
     from ..words.poses import evaluate_command
@@ -106,10 +105,6 @@ def path(
 
         check_library("plotly", "pages with a robot")
     files.check(inputs if along is None else {**inputs, Path(along): "the path that is read"})
-    if moving := dimensions_along(loaded):
-        for option, file in (("--plot", plot), ("--html", html), ("--csv", csv_file)):
-            if file is not None:
-                raise InputError(f"{option}: is not supported while {moving[0]} changes along the path")
     with spinner("reading the path") as show:
         programmed = (
             path_of_case(loaded, choices)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..proof.checker.proof_file import PathPremises, Proof, Unproved
     from ..proof.checker.workspace.check import CheckedClaim, VerifiedWorkspace
     from ..proof.workspace.judgement import Judgement
+    from ..proof.workspace.pose_settings import SettingsProof
     from ..proof.workspace.proof_record import ProofRecord
     from ..words.text import Line
 
@@ -78,16 +79,12 @@ def path_premises(target: str | None, case: Case, along: str | None, choices: Pa
     Raises:
         InputError: the file cannot be read, or is too long for a proof file.
     """
-    from ..errors import InputError
     from ..path.reader import text_of_path
-    from ..path.settings import dimensions_along
     from ..proof.checker.workspace.path_premises import premises_of
 
     stated = case.path if along is None else None
     if target is None or (along is None and stated is None):
         return None
-    if moving := dimensions_along(case):
-        raise InputError(f"--proof: proof files do not support {moving[0]}, a dimension that changes along the path")
     file, name = (along, along) if stated is None else (stated.file, stated.name)
     return premises_of(case, file or "", text_of_path(name or ""), choices, of_case=stated is not None)
 
@@ -117,6 +114,19 @@ def path_proof_text(
     return _proof_file_text(target, path_proof_of(case, judged, record, text, premises))
 
 
+def settings_proof_text(target: str | None, found: SettingsProof, text: str) -> str | None:
+    """Return the text of the proof file of settings for every pose; see :func:`proof_text`.
+
+    Args:
+        target: file name; ``-`` is standard output.
+        found: the verdict.
+        text: text of the case file.
+    """
+    from ..proof.workspace.settings_proof_writer import settings_proof_of
+
+    return None if target is None else _proof_file_text(target, settings_proof_of(found, text))
+
+
 def _proof_file_text(target: str, proof: Proof) -> str | None:
     """Return the text of a proof file, and print a notice for each claim without a proof; None without any proof."""
     from ..errors import one_line
@@ -138,9 +148,18 @@ def verified_lines(proof: Proof, case: Case, leg_error: float) -> Iterator[Line]
     """
     from ..proof.checker.proof_file import ProofError
     from ..proof.checker.workspace.check import check_workspace_proof
+    from ..proof.checker.workspace.settings_check import check_settings_proof
 
+    if case.has_any_settings and leg_error:
+        from ..errors import InputError
+
+        raise InputError('--leg-error: is not supported with settings = "any"')
     try:
-        checked = check_workspace_proof(proof, case, leg_error=leg_error)
+        checked = (
+            check_settings_proof(proof, case)
+            if case.has_any_settings
+            else check_workspace_proof(proof, case, leg_error=leg_error)
+        )
     except ProofError as error:
         print_notice(f"rejected: {error}")
         raise SystemExit(1) from None
@@ -237,7 +256,9 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
             f"poses: {position} {case.units.label(length)}; rotation by {turns.kind.value}{about}: {rotation} "
             f"{case.units.label(angle)}"
         )
-    for task in case.tasks:
+    if case.has_any_settings:
+        yield f"settings: {', '.join(_setting_words(case))}, reset at a standstill"
+    for task in () if case.has_any_settings else case.tasks:
         yield f"{'F' if len(case.tasks) == 1 else f'F of {task.name}'}: of the task {task.name!r}"
     if checked.numbers_at:
         # The boxes of actuators' loads follow the loops from the middle, as those of ranks do.
@@ -245,6 +266,17 @@ def _premises(case: Case, checked: VerifiedWorkspace) -> Iterator[str]:
         others = "quantities" if followed == "ranks" else "other quantities"
         middle = "the home assembly mode at the workspace centre"
         yield f"assembly modes: {followed} in {middle}, {others} in {checked.numbers_at}"
+
+
+def _setting_words(case: Case) -> Iterator[str]:
+    """Yield the range of each setting of which any value may do at a pose."""
+    from ..proof.checker.premises import exact
+    from ..proof.statement.chosen_settings import ranges_of_settings
+
+    kinds = {name: item.dimension for item in case.model.parameters for name in item.components}
+    for name, value in ranges_of_settings(case).items():
+        low, high = (exact(case.units.shown(end, kinds[name])) for end in (value.lower, value.upper))
+        yield f"{case.parameter_name(name)} {low} to {high} {case.units.label(kinds[name])}".rstrip()
 
 
 def _path_premises(premises: PathPremises, path: ProgrammedPath, case: Case) -> Iterator[str]:
@@ -281,6 +313,7 @@ def _untimed_note(untimed: int, segments: int) -> str:
 def _words(claim: CheckedClaim, case: Case) -> str:
     """Return the proved statement of a claim."""
     from ..proof.checker.premises import outward
+    from ..proof.statement.chosen_settings import SETTINGS
     from ..proof.statement.claims import CONSTRAINTS
     from ..results.objective import unit_of_claim
 
@@ -288,6 +321,8 @@ def _words(claim: CheckedClaim, case: Case) -> str:
         return "refuted: at the stated pose J is singular for a robot within the tolerance"
     if claim.is_refuted:
         return "refuted: J is singular at a pose between both stated poses"
+    if claim.name == SETTINGS:
+        return "every pose has a value of each setting that satisfies all limits, without a singularity"
     if claim.bound is None:
         whose = "the constraint wrenches keep their" if claim.name == CONSTRAINTS else "J has full"
         return f"{whose} rank at every pose"

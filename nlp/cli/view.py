@@ -26,10 +26,10 @@ def view(
     from dataclasses import replace
     from pathlib import Path
 
-    from ..errors import CaseError, InputError, one_line
+    from ..errors import InputError, one_line
     from ..output.files import check_outputs, write_text
     from ..output.live.page import live_page
-    from ..view.source import view_source, view_without_solver
+    from ..view.source import view_or_drawing
     from .progress import solve_with_progress
     from .viewed import read_viewed
 
@@ -39,16 +39,24 @@ def view(
     loaded = replace(loaded, search=loaded.search.but(starts, seed))
     target = str(Path(tempfile.mkdtemp(prefix="screwsynth.")) / "view.html") if out is None else out
     check_outputs(inputs, {"--out": target})
-    try:
-        source = view_source(loaded)
-    except CaseError as error:
-        source = view_without_solver(loaded, error)
-    solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
-    page = live_page(source, solution, case)
+    remark = ""
+    if loaded.over_path is not None:
+        from ..output.live.schedule import schedule_page
+        from ..words.schedule import no_schedule_line
+
+        solved = solve_with_progress(loaded, jobs).solution
+        page = schedule_page(solved, case)
+        remark = "" if solved.schedule is not None else no_schedule_line(loaded).words
+    else:
+        source = view_or_drawing(loaded)
+        solution = solve_with_progress(loaded, jobs)[0] if is_solved and not source.subject.nlp.is_fixed else None
+        page = live_page(source, solution, case)
     write_text(target, page.text)
     if target != "-":
         words = f"{one_line(target)}: {len(page.text.encode()) / 1000:.0f} kB"
         print_line(f"{words}; the sliders do not work: {page.fault}" if page.fault else words)
+        if remark:
+            print_line(remark)
     if not no_open and target != "-":
         import webbrowser
 

@@ -65,15 +65,14 @@ def workspace(
             "--scale": scale,
             "--quantity": quantities,
             "--leg-error": leg_error,
-            "--proof": proof,
             "--plot": plot,
             "--plot-pose": plot_pose,
             "--html": html,
         }
         _refuse(unsupported)
-        files = options.Outputs(json=json_file, csv=csv_file)
+        files = options.Outputs(json=json_file, csv=csv_file, proof=proof)
         files.check(inputs)
-        _existence(case, loaded, chosen, time, files, whole=whole)
+        _existence(case, loaded, text, chosen, time, files, whole=whole)
     workspace_of_case(loaded)
     tell_workspace(loaded)
     files = options.Outputs(json=json_file, csv=csv_file, plot=plot, plot_pose=plot_pose, html=html, proof=proof)
@@ -120,13 +119,14 @@ def _refuse(given: Mapping[str, object]) -> None:
 
 
 def _existence(
-    name: str, case: Case, chosen: Settings, time: float | None, files: options.Outputs, *, whole: bool
+    name: str, case: Case, text: str, chosen: Settings, time: float | None, files: options.Outputs, *, whole: bool
 ) -> NoReturn:
     """Prove that settings exist at every pose, write the files, show the answer, and exit."""
     from ..proof.workspace.judge import TIME_LIMIT
     from ..proof.workspace.pose_settings import prove_settings
     from ..results.posesettings import pose_settings_of
     from ..words.poses import evaluate_command
+    from .proofs import settings_proof_text
 
     with spinner("formulating") as show:
         found = prove_settings(
@@ -146,7 +146,12 @@ def _existence(
         return contents.pose_settings_summary(case, result, command)
 
     files.deliver(
-        summary, whole=whole, done=result.proved, json=lambda: result, csv=lambda: contents.tables_as_csv(summary())
+        summary,
+        whole=whole,
+        done=result.proved,
+        json=lambda: result,
+        csv=lambda: contents.tables_as_csv(summary()),
+        proof=lambda: settings_proof_text(files["proof"], found, text),
     )
 
 

@@ -41,8 +41,10 @@ _LARGE = 0.05
 _HEAVY = 1e-3
 #: Largest residual of closed loops; equations have magnitudes of about 1.
 _CLOSED = 1e-10
-#: Largest residual of the loops at home after scaling the robot: rounding of its dimensions.
-_SIMILAR = 1e-7
+#: Largest change of the loops' residuals by scaling the robot: rounding of its dimensions. Residuals are
+#: compared at home, and away from it by a distance relative to the robot's size, or in radians.
+_SIMILAR, _AWAY = 1e-7, 0.1
+_SEED = 0
 #: Singular values below this fraction of the largest are zero: such a loop is mobile at home too.
 _ZERO = 1e-9
 #: A path is near a singularity where a singular value falls below this fraction of that at home.
@@ -267,9 +269,12 @@ class _Path:
         if not min(sizes) > 0:
             return 1.0
         factor = sizes[0] / sizes[1]
-        home, typical = self._home.copy(), np.where(self.is_length, factor * self._typical, self._typical)
-        home[3:6] *= factor
-        return factor if float(np.abs(self._kernel(home, typical)[0]).max(initial=0.0)) <= _SIMILAR else 1.0
+        typical = np.where(self.is_length, factor * self._typical, self._typical)
+        larger = np.where(np.isin(np.arange(len(self._home)), (3, 4, 5)), factor, 1.0)
+        # Points given by dimensions alone close the loops of home at any size, so residuals away from home count too.
+        away = self._home + _AWAY * self.scale * np.random.default_rng(_SEED).uniform(-1, 1, len(self._home))
+        change = [self._kernel(larger * z, typical)[0] - self._kernel(z, self._typical)[0] for z in (self._home, away)]
+        return factor if float(np.abs(np.concatenate(change)).max(initial=0.0)) <= _SIMILAR else 1.0
 
     def singular_values(self, z: FloatArray, parameters: FloatArray) -> FloatArray:
         """Return the smallest singular values of two Jacobians: of the determined unknowns, and of these and the pose.

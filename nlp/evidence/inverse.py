@@ -9,7 +9,7 @@ steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
@@ -77,6 +77,8 @@ class InversePoses:
         positions: (N, 3) origins of the platform frame at the poses, length.
         rotations: (N, 3, 3) platform to world coordinates.
         dependent: names of the dependent coordinates whose values differ from the given values.
+        resets: (N, a, d) changes of the actuator coordinates for a unit of each of d dimensions that change from pose
+            to pose, at a fixed pose of the platform.
     """
 
     actuators: tuple[str, ...]
@@ -92,6 +94,7 @@ class InversePoses:
     positions: FloatArray
     rotations: FloatArray
     dependent: tuple[str, ...] = ()
+    resets: FloatArray | None = None
 
 
 def inverse(
@@ -101,6 +104,7 @@ def inverse(
     *,
     rpy: ArrayLike | None = None,
     follow: Literal["home", "previous"] = "home",
+    changing: Mapping[str, ArrayLike] | None = None,
 ) -> InversePoses:
     """Return joint coordinates, Jacobian and actuator rates at many poses.
 
@@ -116,11 +120,14 @@ def inverse(
             z in this order, like the columns ``roll``, ``pitch`` and ``yaw`` of a CSV file.
         follow: assembly mode for loops without a closed form: ``"home"``, or ``"previous"`` to follow the joints
             from each closed pose to the next. With ``"previous"``, actuator angles have no jumps by a full turn.
+        changing: values (N,) of dimensions that change from pose to pose, by their name in the robot. The pose must
+            determine all joints in closed form.
 
     Raises:
-        CaseError: a dimension of the case's robot is free.
+        CaseError: a dimension of the case's robot is free, and does not change from pose to pose.
         InputError: an array has a wrong shape, rotations are stated in two forms, an angle is more than a whole turn,
-            ``follow`` is not allowed, or an actuator coordinate is not known.
+            ``follow`` is not allowed, an actuator coordinate is not known, or dimensions of a robot change whose joints
+            have no closed form.
     """
     if rotations is not None and rpy is not None:
         raise InputError("rpy: conflicts with rotations; give only one of them")
@@ -135,13 +142,16 @@ def inverse(
         raise InputError(f"poses: expected arrays (N, 3) and (N, 3, 3), got {p.shape} and {R.shape}{hint}")
     if follow not in ("home", "previous"):
         raise InputError(f"follow = {follow!r}: must be 'home' or 'previous'")
-    found = _inverse(case, p, R, follow)
+    dimensions = {name: np.array(values, dtype=np.float64) for name, values in (changing or {}).items()}
+    found = _inverse(case, p, R, follow, dimensions)
+    if dimensions:
+        return found
     # Joints that stay at home cannot determine other coordinates.
     held = replace(case, model=with_joints_at_home(case.model)) if case.model.free_joints else case
     near = None if found.closed.all() else completed(held, p, R, ~found.closed & _are_poses(R, p))
     if near is None or not near.dependent:
         return found
-    return replace(_inverse(case, near.positions, near.rotations, follow), dependent=near.dependent)
+    return replace(_inverse(case, near.positions, near.rotations, follow, {}), dependent=near.dependent)
 
 
 def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
@@ -166,16 +176,19 @@ def _rpy_rows(rpy: ArrayLike, count: int) -> FloatArray:
     return rows
 
 
-def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePoses:
+def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str, changing: Mapping[str, FloatArray]) -> InversePoses:
     """Return the joints at positions (N, 3) with rotations (N, 3, 3), without changing dependent coordinates."""
-    robot = functions_of(case)
+    robot = functions_of(case, tuple(changing))
     poses = np.concatenate([R.transpose(0, 2, 1).reshape(-1, 9), p], axis=1)
     is_pose = _are_poses(R, p)
     moving = np.full((len(p), len(robot.size)), np.nan)
     if len(robot.size) and is_pose.any():
         moving[is_pose] = robot.followed(poses[is_pose], one_by_one=follow == "previous")
+    moving = np.column_stack([moving, *changing.values()])
     blocks = [robot.at(poses[k : k + _BLOCK], moving[k : k + _BLOCK]) for k in range(0, max(len(p), 1), _BLOCK)]
-    q, unknowns, J, rates, margin, residual, signs, modes = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    q, unknowns, J, rates, margin, residual, signs, modes, resets = (
+        np.concatenate(each) for each in zip(*blocks, strict=True)
+    )
     with np.errstate(invalid="ignore"):
         closed = is_pose & np.isfinite(q).all(axis=1) & np.isfinite(unknowns).all(axis=1)
         closed &= (np.abs(residual) <= CLOSED).all(axis=1) & (signs > 0).all(axis=1)
@@ -183,16 +196,16 @@ def _inverse(case: Case, p: FloatArray, R: FloatArray, follow: str) -> InversePo
         singular = closed & ~((margin[:, 0] > _REGULAR) & np.isfinite(rates).all(axis=(1, 2)))
     unsure = np.flatnonzero(singular & np.isfinite(rates).all(axis=(1, 2)) & np.isfinite(J).all(axis=(1, 2)))
     singular[unsure] = _ranks(J[unsure], p[unsure]) < 6
-    for each in (q, unknowns, J, rates):
+    for each in (q, unknowns, J, rates, resets):
         each[~closed] = np.nan
     turning = robot.turning
     if follow == "previous" and turning:
         q[np.ix_(closed, turning)] = np.unwrap(q[np.ix_(closed, turning)], axis=0)
     arrays = q, unknowns, J, rates, closed, singular, p.copy(), R.copy()
-    for each in arrays:
+    for each in (*arrays, resets):
         each.flags.writeable = False
     names = robot.actuators, case.model.free_joints, robot.measures, robot.joints
-    return InversePoses(*names, *arrays)
+    return InversePoses(*names, *arrays, resets=resets)
 
 
 class _Values(NamedTuple):
@@ -206,12 +219,13 @@ class _Values(NamedTuple):
     residual: FloatArray
     signs: FloatArray
     modes: FloatArray
+    resets: FloatArray
 
 
 @lru_cache(maxsize=4)
-def functions_of(case: Case) -> RobotFunctions:
+def functions_of(case: Case, changing: tuple[str, ...] = ()) -> RobotFunctions:
     """Return the functions of a case's robot; the last cases are cached, as a controller calls repeatedly."""
-    return RobotFunctions(case)
+    return RobotFunctions(case, changing)
 
 
 class RobotExpressions(NamedTuple):
@@ -226,6 +240,7 @@ class RobotExpressions(NamedTuple):
         residual: (e, 1) left sides of all loop equations, scaled to magnitudes of about 1.
         signs: (s, 1) expressions that are positive in the home assembly mode.
         modes: (w, 1) expressions that are positive in the home working mode too.
+        resets: (a, d) changes of the actuator coordinates, as in :class:`InversePoses`.
     """
 
     coordinates: SX
@@ -236,6 +251,7 @@ class RobotExpressions(NamedTuple):
     residual: SX
     signs: SX
     modes: SX
+    resets: SX
 
 
 class RobotFunctions:
@@ -243,20 +259,22 @@ class RobotFunctions:
 
     Args:
         case: case with fixed dimensions.
+        changing: dimensions that are inputs of the functions: components of the robot's parameters.
 
     Attributes:
         actuators, measures, joints: names and quantities of :class:`InversePoses`.
         model: model of the robot, without the unknowns that have a closed form.
         robot: the robot at the pose ``z``.
-        z: (12 + f, 1) symbols of the pose, rotation column by column, then position, and of these unknowns.
+        z: (12 + f + d, 1) symbols of the pose, rotation column by column, then position, of these unknowns, and of the
+            dimensions that change.
         expressions: the results, as expressions of ``z``.
         turning: indices of the actuators that turn.
         moving: indices of the actuators that the pose determines.
         size: (f,) sizes of the unknowns without a closed form.
     """
 
-    def __init__(self, case: Case) -> None:
-        self._parameters = case.fixed_parameters("joint positions are computed with fixed dimensions")
+    def __init__(self, case: Case, changing: tuple[str, ...] = ()) -> None:
+        self._parameters = case.fixed_parameters("joint positions are computed with fixed dimensions", changing)
         model, drives = case.model, driven_joints(case.model)
         self.joints = tuple(each.name for each in model.unknowns)
         if self.joints:
@@ -265,13 +283,21 @@ class RobotFunctions:
             listed = Quantity("every unknown", self.joints, all_of_them, Dimension.NUMBER, "of joints")
             model = replace(model, quantities=(*model.quantities, listed))
         at_home = with_joints_at_home(model)
-        kept = tuple(each for each in at_home.actuators if each.joint not in model.free_joints)
+        kept = tuple(each for each in at_home.actuators if each.joint not in model.undetermined)
         self.model = closed_form(replace(at_home, actuators=kept)).model
         own, pose = self.model.unknowns, SX.sym("pose", POSE)
-        z = ca.vertcat(pose, SX.sym("z", len(own)))
+        if own and changing:
+            fault = f"joints of robot {model.name!r} have no closed form, so its dimensions cannot change with the pose"
+            raise InputError(f"inverse kinematics: {fault}")
+        unknowns, numbers = SX.sym("z", len(own)), [SX.sym(name) for name in changing]
+        z = ca.vertcat(pose, unknowns, *numbers)
         position = pose[9:]
         self.z = z
-        given = Substitution(SX(ca.DM(self._parameters)), z[POSE:], ca.reshape(pose[:9], 3, 3), position)
+        names = [name for item in model.parameters for name in item.components]
+        dimensions = SX(ca.DM(self._parameters))
+        for name, symbol in zip(changing, numbers, strict=True):
+            dimensions[names.index(name)] = symbol
+        given = Substitution(dimensions, unknowns, ca.reshape(pose[:9], 3, 3), position)
         robot = instantiate(self.model, given, SX(case.characteristic_length), [SX([0, 0, 1, 0, 0, 0])])
         values = {each.name: robot.quantities[k] for k, each in enumerate(self.model.quantities)}
         known = {
@@ -290,7 +316,7 @@ class RobotFunctions:
         sizes = ca.Function("sizes", [model.symbols], [ca.vertcat(SX(0, 1), *[each.size for each in own])])
         self.size = np.asarray(sizes(self._parameters).full().ravel(), dtype=np.float64)
         every = ca.vertcat(robot.loops, robot.closure)
-        size = np.concatenate([np.ones(POSE), self.size])
+        size = np.concatenate([np.ones(POSE), self.size, np.ones(len(changing))])
         self._loops = Loops(z, robot.closure, every, robot.signs, size)
         is_mode = [each.is_mode for each in self.model.signs]
         rates = SX(len(drives), 6)
@@ -298,8 +324,9 @@ class RobotFunctions:
         self.moving = [k for k, each in enumerate(drives) if each.name in moving]
         rates[self.moving, :] = inverse_rates(self.model, robot)
         self.robot = robot
+        coordinates = ca.vertcat(*[known[name][1] for name in self.actuators])
         self.expressions = RobotExpressions(
-            ca.vertcat(*[known[name][1] for name in self.actuators]),
+            coordinates,
             values.get("every unknown", SX(0, 1)),
             robot.jacobian,
             rates,
@@ -307,18 +334,19 @@ class RobotFunctions:
             every,
             robot.signs[[k for k, mode in enumerate(is_mode) if not mode], :],
             robot.signs[[k for k, mode in enumerate(is_mode) if mode], :],
+            ca.jacobian(coordinates, ca.vertcat(SX(0, 1), *numbers)),
         )
         # CasADi's columns are NumPy's rows.
-        outputs = self.expressions._replace(jacobian=robot.jacobian.T, rates=rates.T)
+        outputs = self.expressions._replace(jacobian=robot.jacobian.T, rates=rates.T, resets=self.expressions.resets.T)
         self._function = ca.Function("inverse", [z], [ca.densify(each) for each in outputs])
         # CasADi caches a mapped function while it is referenced: making it takes as long as evaluating it.
         self._mapped = self._function.map(_BLOCK)
 
     def at(self, poses: FloatArray, moving: FloatArray) -> _Values:
-        """Return the values at poses (B, 12) with unknowns (B, f)."""
+        """Return the values at poses (B, 12) with unknowns and dimensions (B, f + d)."""
         # CasADi's columns are NumPy's rows: the transposes are contiguous.
         found = [each.transpose(0, 2, 1) for each in values_at(self._function, np.hstack([poses, moving]))]
-        return _Values(*(each if k in (2, 3) else each[:, 0] for k, each in enumerate(found)))
+        return _Values(*(each if k in (2, 3, 8) else each[:, 0] for k, each in enumerate(found)))
 
     def followed(self, poses: FloatArray, *, one_by_one: bool) -> FloatArray:
         """Return the unknowns (N, f) without closed form at poses (N, 12); NaN where a path ends early.

@@ -100,13 +100,13 @@ class _Modes:
         paths = {each.limb: each for each in model.joint_screws if not each.is_nested}
         for limb in model.limbs:
             rows = [row for row in model.wrenches if row.limb == limb]
-            driving = [each for each in model.actuators if each.limb == limb and each.joint not in model.free_joints]
+            driving = [each for each in model.actuators if each.limb == limb and each.joint not in model.undetermined]
             path = paths.get(limb)
             if rows and driving:
                 self._add(limb, driven(rows, driving, SX(1)), None, outputs)
             elif driving and path is not None:
                 passive = path.passive
-                actuated = [k for k in path.driven if path.joints[k] not in model.free_joints]
+                actuated = [k for k in path.driven if path.joints[k] not in model.undetermined]
                 if len(passive) == path.passive_rank and len(passive) + len(actuated) == path.all_rank:
                     self._add(limb, path.all[:, [*passive, *actuated]], len(passive), outputs)
         function = ca.Function("modes", own.all, [ca.densify(each) for each in outputs])

@@ -79,28 +79,6 @@ def axis_frame(point: FloatArray, axis: FloatArray) -> Frame:
     return Frame(point, np.column_stack([x, np.cross(z, x), z]))
 
 
-def quaternion_of(R: FloatArray) -> FloatArray:
-    """Return the unit quaternion (4,), scalar part first and not negative, of a rotation matrix (3, 3).
-
-    The largest component is computed from the diagonal, and the others are divided by it, so that no digits are lost
-    (S. W. Shepperd, "Quaternion from rotation matrix", 1978).
-    """
-    squares = np.array(
-        [
-            1 + R[0, 0] + R[1, 1] + R[2, 2],
-            1 + R[0, 0] - R[1, 1] - R[2, 2],
-            1 - R[0, 0] + R[1, 1] - R[2, 2],
-            1 - R[0, 0] - R[1, 1] + R[2, 2],
-        ]
-    )
-    w, x, y = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    a, b, c = R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[1, 2] + R[2, 1]
-    rows = np.array([[squares[0], w, x, y], [w, squares[1], a, b], [x, a, squares[2], c], [y, b, c, squares[3]]])
-    q = rows[int(np.argmax(squares))]
-    q = q / np.linalg.norm(q)
-    return np.asarray(-q if q[0] < 0 else q)
-
-
 def roll_pitch_yaw_of(R: FloatArray) -> FloatArray:
     """Return roll, pitch and yaw (3,) of URDF, radians, with ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
 

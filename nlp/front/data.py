@@ -83,20 +83,20 @@ def front_designs(front: Front, result: FrontResult) -> Designs[int]:
         "Each point is an optimum with evidence: one goal is optimised within bounds on the others. No point "
         "is better than another in all goals."
     )
-    below = "Front of the two goals; gaps have no line."
+    below = "the two goals; gaps have no line."
     if several:
-        below = "One panel for each pair of goals" + (
+        below = "one panel for each pair of goals" + (
             "; the colour shows the third goal." if len(front.goals) == 3 else "."
         )
     return Designs(
         "front",
         front.case,
-        "points of the front",
+        "points: goals and active limits",
         tuple(_columns(front, result)),
         range(len(front.points)),
         Join.CLOUD if several else Join.CURVE,
         PageWords(
-            f"{front.case.name}, robot {front.case.model.name}",
+            f"Pareto front: {front.case.name}, robot {front.case.model.name}",
             f"{lines[0]}.",
             ("front", "Pareto front"),
             ("points", "All points"),

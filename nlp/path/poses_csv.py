@@ -95,7 +95,10 @@ def _settings(table: NumberTable, changing: Changing, units: Units) -> _Set:
     """
     values = changing.values_of(table, units)
     unused = [f"column {name}: not used" for name in table.columns if name in changing.fixed]
-    drives = [f"F locks {name}; its drive has no force or power here: {_JOINTS}" for name in changing.own]
+    drives = [
+        f"F locks {name}; its drive has no force or power here{'' if name in changing.joints else f': {_JOINTS}'}"
+        for name in changing.own
+    ]
     found = _Set(warnings=(*unused, *drives))
     if changing.axis is not None:
         found["tool"] = ToolTurn(changing.axis, values.get(TURN, np.full(len(table.rows), changing.turn)))

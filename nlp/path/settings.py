@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...models import Dimension, FloatArray
+from ...models.model import joint_parameter
 from ..case.pathfile import TURN
 from ..case.pose import Free
-from ..case.task import LEG_LENGTH, Task
+from ..case.task import ALONG, Task
 from ..errors import InputError
 from ..units import Units
 
@@ -65,6 +66,14 @@ class Settings:
     names: tuple[str, ...] = ()
     values: FloatArray | None = None
 
+    def by_name(self, segments: NDArray[np.intp], s: FloatArray) -> dict[str, FloatArray]:
+        """Return the values (k,) of each dimension at parameters (k,) of segments (k,)."""
+        return dict(zip(self.names, self.at(segments, s).T, strict=True))
+
+    def changes(self, segments: NDArray[np.intp]) -> FloatArray:
+        """Return the changes (k, d) of the values over whole segments (k,)."""
+        return np.zeros((len(segments), 0)) if self.values is None else np.diff(self.values, axis=0)[segments]
+
     def at(self, segments: NDArray[np.intp], s: FloatArray) -> FloatArray:
         """Return the values (k, d) at parameters (k,) of segments (k,)."""
         if self.values is None:
@@ -84,6 +93,7 @@ class Changing:
         own: name of each dimension in the robot, by name of its column.
         dimensions: dimension of each setting.
         fixed: names of columns of quantities that the case fixes.
+        joints: names of the columns of actuated joints.
     """
 
     axis: FloatArray | None
@@ -92,6 +102,7 @@ class Changing:
     own: Mapping[str, str]
     dimensions: Mapping[str, Dimension]
     fixed: tuple[str, ...]
+    joints: tuple[str, ...] = ()
 
     @property
     def unread(self) -> Changing:
@@ -192,18 +203,13 @@ def case_along(case: Case, settings: Settings) -> Case:
                 low, high = float(own.min()), float(own.max())
                 values[k] = Free(low, high) if low < high else low
         parameters[item.name] = values if len(values) > 1 else values[0]
-    stated = tuple(task for task in case.tasks if not (task.follows or task.measure == LEG_LENGTH))
+    stated = tuple(task for task in case.tasks if not (task.follows or task.measure in ALONG))
     tasks = stated or (replace(Task.translation((0.0, 0.0, 1.0)), is_stated=False),)
     return replace(case, parameters=parameters, tasks=tasks, over_path=None, path=None)
 
 
 #: No tool, and no quantity that changes.
 UNCHANGED = Changing(None, 0.0, {}, {}, {}, ())
-
-
-def dimensions_along(case: Case) -> list[str]:
-    """Return the names of the dimensions of a case that change along its path."""
-    return [name for name in case.settings if name != TURN]
 
 
 def changing_of(case: Case) -> Changing:
@@ -216,8 +222,9 @@ def changing_of(case: Case) -> Changing:
             else:
                 fixed.append(column)
     tool = None if case.path is None else case.path.tool
+    joints = tuple(map(joint_parameter, case.model.locked))
     if tool is None:
-        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed))
+        return Changing(None, 0.0, ranges, own, dimensions, tuple(fixed), joints)
     if TURN in ranges:
         dimensions[TURN] = Dimension.ANGLE
     else:
@@ -226,4 +233,4 @@ def changing_of(case: Case) -> Changing:
     axis = np.array(tool.axis, dtype=np.float64)
     # Division by the largest component first: squares neither overflow nor vanish.
     axis = axis / np.abs(axis).max()
-    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed))
+    return Changing(axis / np.linalg.norm(axis), turn, ranges, own, dimensions, tuple(fixed), joints)

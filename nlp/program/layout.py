@@ -43,6 +43,7 @@ from ...models import (
     reason_for_zero_row,
 )
 from ...models.instance import length_of, sizes_at
+from ...models.model import joint_parameter
 from ...models.values import dataclass
 from ..case.case import Case
 from ..case.choices import check_no_catalogue
@@ -349,7 +350,7 @@ def robot_length(case: Case) -> float:
 def _name_of(unknown: Unknown, pose: int) -> str:
     """Return the name of an unknown's variable at a pose, counted from 1; 0 for a single pose."""
     if unknown.is_free:
-        return f"joint.{unknown.joint}{f' pose {pose}' if pose else ''}"
+        return f"{joint_parameter(unknown.joint)}{f' pose {pose}' if pose else ''}"
     return f"at{pose}_{unknown.name}" if pose else unknown.name
 
 

@@ -8,7 +8,7 @@ from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.forces import dimension_of_measure
 from ..case.limits.objective import ObjectiveLimit
-from ..case.task import LEG_LENGTH
+from ..case.task import LEG_LENGTH, SMALLEST
 from ..evidence.loads import PoseLoads, largest_of
 from ..proof.certificate.certificate import Certificate
 from ..system.jsonvalues import Absent, JsonObject, finite_or_none
@@ -24,6 +24,7 @@ class ObjectiveData(JsonObject):
 
     Attributes:
         minimise: name of the actuator quantity; absent for F.
+        maximise: name of a quantity of J that is maximised along a path; absent for F.
         over: domain of the worst F, ``workspace`` or ``path``; absent for an actuator quantity.
         value: largest value over loads, actuators and poses, or worst F; a proved bound where limits cover a workspace
             or path. Null without an answer, or if nothing is proved.
@@ -33,6 +34,7 @@ class ObjectiveData(JsonObject):
     """
 
     minimise: Absent[str]
+    maximise: Absent[str]
     over: Absent[str]
     value: float | None
     unit: str
@@ -54,7 +56,8 @@ def objective_data(case: Case, value: float | None, certificate: Certificate | N
     bound = None if certificate is None else finite_or_none(certificate.bound)
     shown = None if value is None else finite_or_none(value)
     return ObjectiveData(
-        minimise=measure or None,
+        minimise=None if measure == SMALLEST else measure or None,
+        maximise=measure if measure == SMALLEST else None,
         over=case.limits_over if case.worst_everywhere else None,
         value=shown,
         unit=unit_of_objective(case),
@@ -95,8 +98,10 @@ def _in_unit(case: Case, value: float) -> float:
 
 
 def _dimension(case: Case) -> Dimension:
-    """Return the dimension of the actuator quantity that a case optimises."""
+    """Return the dimension of the quantity that a case optimises in place of F."""
     measure = case.tasks[0].measure
+    if measure == SMALLEST:
+        return Dimension.NUMBER
     return Dimension.LENGTH if measure == LEG_LENGTH else dimension_of_measure(measure, driven_joints(case.model)[0])
 
 

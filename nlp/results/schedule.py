@@ -15,11 +15,13 @@ class ConstantSettingData(JsonObject):
     Attributes:
         values: value of each setting.
         value: objective with these values.
+        design: values of the free dimensions of the design with these values.
         gain: relative gain of the schedule over these values; 0 for a gain below 1e-6.
     """
 
     values: Vector
     value: float
+    design: Mapping[str, float]
     gain: float
 
 
@@ -52,6 +54,7 @@ class ScheduleData(JsonObject):
         F: objective of each point.
         bound: proved bound of the objective of all schedules of this design; absent if no proof was requested.
         gap: relative distance of the bound from the objective.
+        reason: reason why the requested gap of the bound was not reached; absent if it was.
         statement: proved statement in words.
         proved: true if the schedule is proved to have no singularity and no violated limit along the whole path; absent
             without limits over the path.
@@ -72,6 +75,7 @@ class ScheduleData(JsonObject):
     F: Vector
     bound: Absent[float]
     gap: Absent[float]
+    reason: Absent[str]
     statement: Absent[str]
     proved: Absent[bool]
     added: Absent[int]
@@ -90,7 +94,9 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         design=schedule.design,
         constant=None
         if constant is None
-        else ConstantSettingData(values=vector(constant.values), value=constant.value, gain=schedule.gain or 0.0),
+        else ConstantSettingData(
+            values=vector(constant.values), value=constant.value, design=constant.design, gain=schedule.gain or 0.0
+        ),
         rates=tuple(
             RateData(used=finite_or_none(used), max=finite_or_none(most))
             for used, most in zip(schedule.rates_used.tolist(), schedule.rates.tolist(), strict=True)
@@ -100,6 +106,7 @@ def schedule_data(schedule: Schedule) -> ScheduleData:
         F=vector(schedule.F),
         bound=schedule.bound,
         gap=schedule.gap,
+        reason=schedule.reason or None,
         statement=schedule.statement or None,
         proved=None if schedule.judgement is None else schedule.judgement.is_proved,
         added=None if schedule.judgement is None else schedule.added,

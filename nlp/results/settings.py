@@ -185,6 +185,8 @@ def dimensions_of(robots: Sequence[RobotData], case: Case) -> Settings:
     found: dict[str, float | list[float]] = {}
     changing = case.dimensions_per_task
     for item in case.model.parameters:
+        if case.settings.keys() & set(case.component_names(item)):
+            continue  # a schedule gives its values
         of_task = [_setting(robot.parameters[item.name]) for robot in robots]
         names = case.component_names(item)
         if not changing.keys() & set(item.components) and not case.settings.keys() & set(names):

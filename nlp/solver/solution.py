@@ -149,7 +149,7 @@ class Combination:
 
 @dataclass(frozen=True, eq=False)
 class SharedInstead:
-    """Answer to the same problem with one change fewer: a dimension or the pose is the same for every task.
+    """Comparison with the same problem in which one dimension, or the pose, is the same for every task.
 
     Attributes:
         name: name of the dimension; ``pose`` for the pose.

@@ -18,7 +18,7 @@ from ...models.statics import driven_joints
 from ..case.case import Case
 from ..case.excursions import in_world
 from ..case.forces import dimension_of_force, dimension_of_speed
-from ..case.pose import ends_of
+from ..case.pose import OverPoses, ends_of
 from ..case.workspace import POSITION, TurnKind
 from ..embedding.runtimelimits import run_time_limits
 from ..program.nlp import Nlp
@@ -116,13 +116,14 @@ class RowData(TypedDict):
 
 
 class TaskData(TypedDict):
-    """Task: name, sense, first index of its twist in ``p``, index of its weight (-1 for none), unit of its rates."""
+    """Task: name, sense, first index of its twist in ``p``, index of its weight (-1 for none), units of rates and F."""
 
     name: str
     sense: str
     twist: int
     weight: int
     unit: str
+    F_unit: str
 
 
 class ActuatorData(TypedDict):
@@ -147,7 +148,8 @@ class QuantityData(TypedDict):
 class ViewData(TypedDict):
     """Everything that a live page needs besides its module and its drawing.
 
-    ``stated_poses`` has the index of the stated pose of each pose. ``pose_tasks`` has the index of its task if the
+    ``is_mean`` says whether F of a task is the mean over its poses, instead of the sum. ``stated_poses`` has the index
+    of the stated pose of each pose. ``pose_tasks`` has the index of its task if the
     dimensions or the pose change from task to task, and is empty otherwise.
     """
 
@@ -168,6 +170,7 @@ class ViewData(TypedDict):
     F_unit: str
     sense: str
     poses: int
+    is_mean: bool
     stated_poses: list[int]
     pose_tasks: list[int]
     limbs: list[str]
@@ -205,8 +208,9 @@ def view_data(source: ViewSource) -> ViewData:
                 "twist": twist,
                 "weight": int(weight),
                 "unit": rate_unit(np.ravel(task.twist).tolist(), units) if task.is_stated else "",
+                "F_unit": unit_of_objective(case, k),
             }
-            for task, twist, weight in zip(case.tasks, twists, weights, strict=False)
+            for k, (task, twist, weight) in enumerate(zip(case.tasks, twists, weights, strict=False))
         ],
         "loads": [each.name for each in case.loading.cases] if loading else [],
         "actuators": _actuators(case),
@@ -223,6 +227,7 @@ def view_data(source: ViewSource) -> ViewData:
         "F_unit": unit_of_objective(case, 0) if len(case.tasks) == 1 else unit_of_objective(case),
         "sense": nlp.sense.value,
         "poses": len(program.robots),
+        "is_mean": case.over_poses is OverPoses.MEAN,
         "stated_poses": [each.pose for each in case.stations],
         "pose_tasks": list(program.places.tasks),
         "limbs": list(case.model.limbs),

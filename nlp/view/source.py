@@ -19,6 +19,7 @@ from ..errors import CaseError
 from ..program.formulation import formulate_each, formulate_whole
 from ..program.nlp import Nlp
 from .functions import ViewFunctions, view_functions
+from .parts import in_parts
 
 #: Folder of the template and of the headers in place of those of a C library.
 FOLDER = Path(__file__).parent / "c"
@@ -66,6 +67,7 @@ def view_source(case: Case) -> ViewSource:
     functions = view_functions(subject.nlp, f"{prefix}_VIEW")
     files = {name: generated[name] for name in solver_files(generated, prefix, ".c", ".h")}
     files |= {f"{prefix}-view-casadi{end}": text for end, text in casadi_texts(functions.all, f"{prefix}_VIEW").items()}
+    files = {name: in_parts(text) if name.endswith("-casadi.c") else text for name, text in files.items()}
     files[f"{prefix}-view.c"] = _exports(subject, functions, prefix)
     files |= {name: (FOLDER / name).read_text(encoding="utf-8") for name in _HEADERS}
     return ViewSource(subject, functions, files)
@@ -81,6 +83,14 @@ def view_without_solver(case: Case, error: CaseError) -> ViewSource:
     subject = Subject(formulate_whole(case) if case.changes else formulate_each(case)[0], None)
     functions = view_functions(subject.nlp, f"{identifier(case.name)}_VIEW")
     return ViewSource(subject, functions, {}, _reason(case, error))
+
+
+def view_or_drawing(case: Case) -> ViewSource:
+    """Return the C of the live view of a case; where C cannot be generated, the view without a module."""
+    try:
+        return view_source(case)
+    except CaseError as error:
+        return view_without_solver(case, error)
 
 
 def _reason(case: Case, error: CaseError) -> str:

@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..case.case import Case
-from ..case.task import Sense
+from ..case.task import Sense, Task
 from ..evidence.optimality import CURVED, PointKind
 from ..proof.certificate.certificate import CertificateStatus
 from ..results.rounding import ordered, robot_size, settled, task_F
 from ..solver.status import Status
 from ..units import Units, objective_unit
 from .joints import convention_lines, joint_lines, motion_words, reach_of, screw_words, triple
-from .numbers import number, per_words, quantity_words, residual, rounded_to
+from .numbers import key_words, number, per_words, quantity_words, residual, rounded_to
 from .objective import objective_words
 from .text import Line, Tone
 
@@ -39,6 +39,12 @@ _FULL_RANK = 6
 _FEW, _MANY = 0.125, 8
 #: Smallest over largest singular value of J, below which a regular robot has a caution.
 _NEAR = 1e-3
+#: Motions that move with a tool path, by the key of the case file.
+_FOLLOWED = {
+    "feed": "translation along the feed at each point",
+    "tool": "rotation about the tool's axis at each point",
+    "thrust": "translation along the tool's axis at each point",
+}
 #: Distance of optimal points, as a fraction of the variable ranges: more distant points are a set, not one optimum.
 SET = 1e-3
 
@@ -63,6 +69,11 @@ def task_lines(task: TaskData, units: Units) -> Iterator[Line]:
     screw = screw_words(task.motion, units, reach_of(task.motion, 0.0))
     yield Line(f"{task.name}, {task.sense.value} F: {screw} through {stated}", label="task")
     yield Line(f"nearest to the origin at {nearest}", label="task axis")
+
+
+def followed_words(task: Task) -> str:
+    """Return the motion of a task that moves with the tool path of its case."""
+    return _FOLLOWED[task.follows]
 
 
 def task_words(task: TaskData, units: Units) -> str:
@@ -239,13 +250,19 @@ def relaxation_sentences(result: SolveResult, case: Case) -> Iterator[str]:
             yield f"would be feasible with {row.key} = {needed}{unit} instead of {row.limit:g}{unit}"
 
 
-def costliest_words(limits: Sequence[LimitData]) -> str | None:
-    """Return a sentence about the active limit with the largest relative effect on F; None without such a limit."""
+def costliest_words(limits: Sequence[LimitData], *, in_words: bool = False) -> str | None:
+    """Return a sentence about the active limit with the largest relative effect on F; None without such a limit.
+
+    Args:
+        limits: limits of the case.
+        in_words: If true, the key of the limit is in words.
+    """
     costly = [(row, row.cost) for row in limits if row.active and row.cost]
     if not costly:
         return None
     row, cost = max(costly, key=lambda each: ordered(abs(each[1] * (each[0].limit or 1.0))))
-    return f"The active limit with the largest relative effect is {row.key}: F {cost:+.4g} {per_words(row.unit)}."
+    name = key_words(f"limits.{row.key}") if in_words else row.key
+    return f"The active limit with the largest relative effect is {name}: F {cost:+.4g} {per_words(row.unit)}."
 
 
 def active_limit_lines(limits: Sequence[LimitData], title: str = "") -> Iterator[Line]:

@@ -22,6 +22,8 @@ _LOADED = re.compile(r" (?:(backwards|smallest) )?load (.+?)(?=(?:, other sense)
 #: Key of a limit or a setting, and words for ends of a range.
 _KEY = re.compile(r"(?<![\w.])(?:(?:limits|task)(?:\.[a-z]\w*)+|[a-z]\w*(?:\.[a-z]\w*)*\.(?:min|max)\b)")
 _ENDS = {"min": "minimum", "max": "maximum"}
+#: Underscore of a name; that of a coordinate such as ``p_y`` belongs to its symbol.
+_UNDERSCORE = re.compile(r"_(?![a-z](?![a-z]))")
 _SENSES = {None: "", "backwards": ", negative force", "smallest": ", smallest force"}
 
 
@@ -71,15 +73,20 @@ def key_words(text: str) -> str:
     """Return a text with the keys of limits and settings in words, such as ``maximum leg length``.
 
     ``limits.leg_length.max`` becomes ``maximum leg length``, and ``limits.footprint.base`` becomes ``footprint base``.
-    Other names, such as ``x1``, stay as they are.
+    Other names, such as ``x1``, stay as they are, and ``p_y.min`` becomes ``minimum p_y``.
     """
     return _KEY.sub(_words_of_key, text)
 
 
 def _words_of_key(found: re.Match[str]) -> str:
     *names, end = found[0].removeprefix("limits.").split(".")
-    words = " ".join(name.replace("_", " ") for name in names)
-    return f"{_ENDS[end]} {words}" if end in _ENDS else f"{words} {end.replace('_', ' ')}".strip()
+    words = spaced(" ".join(names))
+    return f"{_ENDS[end]} {words}" if end in _ENDS else f"{words} {spaced(end)}".strip()
+
+
+def spaced(name: str) -> str:
+    """Return the name of a quantity with spaces, such as ``leg length limb 1-``; ``p_y`` stays as it is."""
+    return _UNDERSCORE.sub(" ", name)
 
 
 def residual(value: float) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..case.case import Case
-from ..case.task import Sense
+from ..case.task import LEG_LENGTH, SMALLEST, Sense
 from ..results.objective import unit_of_objective
 
 
@@ -14,6 +14,11 @@ def objective_words(case: Case) -> str:
         is_least = case.tasks[0].sense is Sense.MAX
         worst = f"the {'smallest' if is_least else 'largest'} value {case.limits_where}"
         return f"{worst} ({'maximised' if is_least else 'minimised'})" if case.worst_everywhere else ""
+    if measure == LEG_LENGTH:
+        return "the length of the longest leg (minimised)"
+    if measure == SMALLEST:
+        length = f"{case.tasks[0].length:g} {case.units.length}"
+        return f"the smallest singular value of J, with moments divided by {length} (maximised)"
     over = "actuators" if measure == "actuator_speed" else "actuators and loads"
     return f"the largest {measure.replace('_', ' ')} over all {over} (minimised)"
 

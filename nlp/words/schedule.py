@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..case.pose import OverPoses
-from ..case.task import LEG_LENGTH
+from ..case.task import LEG_LENGTH, SMALLEST
 from ..results.objective import unit_of_objective
+from ..results.point import task_data
+from .lines import followed_words, task_lines
 from .numbers import number
 from .text import Line, TextTable, Tone
 
@@ -21,24 +23,41 @@ def objective_name(case: Case) -> str:
     measure, is_mean = case.tasks[0].measure, case.over_path is OverPoses.MEAN
     if not measure:
         return "mean F" if is_mean else "worst F"
-    name = "longest leg" if measure == LEG_LENGTH else f"largest {measure.replace('_', ' ')}"
+    own = {LEG_LENGTH: "longest leg", SMALLEST: "smallest singular value"}
+    name = own.get(measure, f"largest {measure.replace('_', ' ')}")
     return f"mean {name}" if is_mean else name
+
+
+def schedule_task_lines(case: Case) -> Iterator[Line]:
+    """Yield name, sense and motion of each task along the path."""
+    for k, task in enumerate(case.tasks):
+        if task.follows:
+            yield Line(f"{task.name}, {task.sense.value} F: {followed_words(task)}", label="task")
+        elif task.is_stated:
+            yield from task_lines(task_data(case, k), case.units)
 
 
 def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTable]:
     """Yield the objective with its gain over the best constant, the bound, and the rates."""
     name, segments = objective_name(case), schedule.segments
     where = f"along {segments:,} segment{'s' * (segments != 1)}"
-    unit = unit_of_objective(case) if case.tasks[0].measure else ""
+    unit = unit_of_objective(case)
     yield Line(
         f"{name} = {number(schedule.value)}{f' {unit}' if unit else ''}",
         tone=Tone.ANSWER,
         after=f" {where} ({_gain(schedule)})",
     )
+    if case.model.locked:
+        joints = case.model.locked
+        who = f"actuated joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+        yield Line(f"F is taken with {who} locked at each point of the path", label="note")
     yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
     if schedule.bound is not None and schedule.gap is not None:
-        words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %)"
+        stopped = "" if schedule.reason is None else f"; stopped: {schedule.reason}"
+        words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %{stopped})"
         yield Line(words, label="bound", tone=Tone.HOLDS)
+    elif schedule.reason is not None:
+        yield Line(f"none proved; stopped: {schedule.reason}", label="bound", tone=Tone.NO_ANSWER)
     if schedule.proved is not None:
         points = f"{schedule.added} point{'s' * (schedule.added != 1)} added"
         verdict = "no singularity and no violated limit at any point of the path"
@@ -87,6 +106,17 @@ def no_schedule_line(case: Case) -> Line:
     names = ", ".join(case.settings) or "design"
     words = f"no schedule found: the search found no {names} within the limits and rates; this is no proof"
     return Line(words, tone=Tone.NO_ANSWER)
+
+
+def gain_words(schedule: ScheduleData) -> str:
+    """Return the gain over the best constant; empty without settings."""
+    names = ", ".join(schedule.names)
+    if not names:
+        return ""
+    if schedule.constant is None:
+        return f"no constant {names} keeps the limits"
+    gain = schedule.constant.gain
+    return f"{_signed(schedule, gain) if gain else 'no gain'} compared with the best constant {names}"
 
 
 def _gain(schedule: ScheduleData) -> str:

@@ -103,12 +103,11 @@ def _task_summary(case: Case, result: SolveResult) -> Summary:
 
 def _schedule_summary(case: Case, result: SolveResult) -> Summary:
     """Yield the objective over the path with its bound, the settings and the design; then the schedule."""
-    from .schedule import no_schedule_line, schedule_lines, schedule_table  # noqa: PLC0415 - few cases have one
+    # Few cases have a schedule.
+    from .schedule import no_schedule_line, schedule_lines, schedule_table, schedule_task_lines  # noqa: PLC0415
 
     yield title_line(case)
-    for task in case.tasks:
-        if task.is_stated:
-            yield Line(f"{task.name}, {task.sense.value} F: {task.follows or 'stated motion'}", label="task")
+    yield from schedule_task_lines(case)
     if result.schedule is None:
         yield no_schedule_line(case)
         return

@@ -41,12 +41,12 @@ def tradeoff_designs(result: TradeoffResult, case: Case, found: Tradeoff | None 
     return Designs(
         "trade-off",
         case,
-        over,
+        f"values: {over}",
         tuple(_columns(result, throughout)),
         result.points,
         Join.CURVE,
         PageWords(
-            f"{case.name}, robot {case.model.name}: {key_words(over)}",
+            f"Trade-off: {case.name}, robot {case.model.name}, over {key_words(result.over)}",
             f"{solved} of {len(result.points)} values have an answer",
             ("curve", "Trade-off curve"),
             ("values", "All values"),

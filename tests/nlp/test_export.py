@@ -34,6 +34,7 @@ from mujoco_trees import Tree
 from screwsynth.models import WrenchKind, robot
 from screwsynth.models.catalog import SHIPPED
 from screwsynth.models.mechanism import Coupling, Mechanism, MechanismJoint, MechanismLink, links_of, wrenches_of
+from screwsynth.models.rotation import quaternion_from_matrix
 from screwsynth.nlp import (
     Case,
     Free,
@@ -52,7 +53,7 @@ from screwsynth.nlp.evidence.kkt import close_equations
 from screwsynth.nlp.evidence.mobility import mobility_of
 from screwsynth.nlp.evidence.state import loops_are_closed
 from screwsynth.nlp.formats.export import exported_files, files_at
-from screwsynth.nlp.formats.frames import quaternion_of, roll_pitch_yaw_of
+from screwsynth.nlp.formats.frames import roll_pitch_yaw_of
 from screwsynth.nlp.formats.reading.importing import Imported, Request, import_robot
 from screwsynth.nlp.formats.reading.reduction import Ends
 from screwsynth.nlp.formats.solved.mechanism_of import Exported, mechanism_of
@@ -334,7 +335,7 @@ def test_rotations_survive_their_three_forms() -> None:
             pitched = turn_about(z, rng.uniform(-3, 3)) @ turn_about(y, np.pi / 2)
             R = R @ np.diag([1.0, -1.0, -1.0]) @ R.T if rng.uniform() < 0.5 else pitched
         found = np.zeros(9)
-        mujoco.mju_quat2Mat(found, quaternion_of(R))
+        mujoco.mju_quat2Mat(found, quaternion_from_matrix(R))
         np.testing.assert_allclose(found.reshape(3, 3), R, atol=1e-14)
         roll, pitch, yaw = roll_pitch_yaw_of(R)
         np.testing.assert_allclose(turn_about(z, yaw) @ turn_about(y, pitch) @ turn_about(x, roll), R, atol=1e-14)

@@ -12,7 +12,7 @@ import pytest
 from builders import Run, assert_words, saved
 from measures import exponential
 
-from screwsynth.nlp import load_case, solve
+from screwsynth.nlp import load_case, report, solve
 from screwsynth.nlp.case.pose import Rotation
 from screwsynth.nlp.evidence.evaluation import starting_point
 from screwsynth.nlp.evidence.state import evaluate
@@ -124,6 +124,115 @@ def test_the_first_screen_of_a_report_is_live(opened: Callable[..., Any], cli: R
     numbers = {key: [*map(float, each.split(","))] for key, each in settings.items()}
     nlp = formulate(load_case("paper-4.1-helical", {k: v[0] if len(v) == 1 else v for k, v in numbers.items()}))
     assert chrome.execute_script(POSE)[2] == pytest.approx(evaluate(nlp, starting_point(nlp)).F, rel=1e-9)
+    assert faults(chrome) == []
+
+
+@pytest.fixture(scope="module")
+def live_report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A report whose first screen is the live view."""
+    page = tmp_path_factory.mktemp("report") / "report.html"
+    page.write_text(report(solve(load_case("paper-4.1-helical"), starts=2)), encoding="utf-8")
+    return page
+
+
+@pytest.mark.parametrize("width", [420, 1400])
+def test_a_picture_and_the_dimensions_stand_there_without_a_script(
+    browser: Any,  # noqa: ANN401
+    live_report: Path,
+    width: int,
+) -> None:
+    browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    try:
+        browser.get("about:blank")
+        browser.get(live_report.as_uri())
+        # The driver's own scripts are not those of the page, and run.
+        image = browser.find_element("css selector", "#live img")
+        assert image.is_displayed()
+        assert image.rect["y"] + image.rect["height"] / 2 < 900
+        assert image.rect["width"] > 0.9 * min(width, 700) - 40
+        rows = browser.find_elements("css selector", "#live tbody tr")
+        assert {"x1", "x2", "p_z"} <= {each.text.split()[0] for each in rows}
+        (note,) = browser.find_elements("css selector", "#live noscript p")
+        assert "need JavaScript" in note.text
+        assert browser.find_element("id", "answer").is_displayed()
+        assert fits(browser, width)
+    finally:
+        browser.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_a_started_view_replaces_the_picture_and_follows_the_colour_scheme(
+    opened: Callable[..., Any], live_report: Path
+) -> None:
+    chrome = opened(live_report)
+    assert not chrome.find_element("css selector", "#live img").is_displayed()
+    assert not chrome.find_element("id", "answer").is_displayed()
+    # Robot, headline and the first slider are on the first screen.
+    places = chrome.execute_script(
+        f"{IN_VIEW} return ['robot', 'answer', 'slider-0']"
+        ".map((id) => root.getElementById(id).getBoundingClientRect().top)"
+    )
+    assert max(places) < 900
+    back = "return getComputedStyle(document.getElementById('live')).getPropertyValue('--back').trim()"
+    shades = {}
+    for scheme in ("light", "dark"):
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        shades[scheme] = chrome.execute_script(back)
+        # The canvas is drawn again in the colours of the scheme: its corner has no robot.
+        corner = chrome.execute_script(
+            f"{IN_VIEW} const canvas = root.getElementById('robot'); return getComputedStyle(canvas).backgroundColor"
+        )
+        assert (sum(map(int, re.findall(r"\d+", corner)[:3])) < 200) is (scheme == "dark")
+    chrome.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    assert shades["light"] == "#ffffff"
+    assert shades["dark"] != shades["light"]
+    assert faults(chrome) == []
+
+
+PROGRAM = "G21 G90\nG0 X0 Y0 Z20\nG0 X1\nG1 X2 Y1 F600\nG1 X0 Y1\n"
+
+
+def test_bars_of_lengths_begin_at_their_range_and_rapid_moves_have_no_time(
+    opened: Callable[..., Any], cli: Run, tmp_path: Path
+) -> None:
+    case = Path(__file__).parents[2] / "cases" / "hexapod-pocket.toml"
+    own = saved(tmp_path / "milling.toml", case.read_text(encoding="utf-8").split("[path]")[0])
+    part, page = saved(tmp_path / "part.ngc", PROGRAM), tmp_path / "path.html"
+    code, _, errors = cli("path", str(own), "--along", str(part), "--html", str(page), "--time", "1")
+    assert (code in (0, 1), errors) == (True, "")
+    chrome = opened(page)
+    data = chrome.execute_script("return screwsynth.track.data")
+    panels = {each["title"]: each for each in data["panels"]}
+    lengths, speeds = panels["leg lengths"], panels["speeds along the path"]
+    values = [value for each in lengths["curves"] for value in each["values"]]
+    assert lengths["base"] == lengths["low"] < min([*values, *lengths["limits"]])
+    assert lengths["high"] > max([*values, *lengths["limits"]])
+    assert (speeds["base"], speeds["low"]) == (0, -speeds["high"])
+    read = (
+        f"{IN_VIEW} return [...root.querySelectorAll('#track .panel')].map((panel) => ["
+        "panel.querySelector('h2').textContent,"
+        " [...panel.querySelectorAll('.drive')].map((each) => [each.querySelector('output').textContent,"
+        " parseFloat(each.querySelector('i').style.left), parseFloat(each.querySelector('i').style.width),"
+        " [...each.querySelectorAll('b')].map((mark) => parseFloat(mark.style.left))])])"
+    )
+    timed = {frame["has_time"] for frame in data["frames"]}
+    assert timed == {True, False}
+    for index in (0, len(data["frames"]) - 1):
+        chrome.execute_script(TRAVEL, index)
+        act(chrome, "")
+        shown = {title.split(",")[0]: rows for title, rows in chrome.execute_script(read)}
+        for row, curve in zip(shown["leg lengths"], lengths["curves"], strict=True):
+            _, left, width, marks = row
+            part_of = (curve["values"][index] - lengths["low"]) / (lengths["high"] - lengths["low"])
+            assert (left, width) == (0, pytest.approx(100 * part_of, abs=0.02))
+            # Both limits are within the bar's track.
+            assert len(marks) == len(lengths["limits"])
+            assert all(0 < mark < 100 for mark in marks)
+        texts = {text for text, *_ in shown["speeds along the path"]}
+        assert (texts == {"no time"}) is (not data["frames"][index]["has_time"])
     assert faults(chrome) == []
 
 

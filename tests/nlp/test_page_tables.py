@@ -7,7 +7,7 @@ import pytest
 from builders import case_from
 
 from screwsynth.nlp import solve
-from screwsynth.nlp.output.report.markup import tag, with_minus
+from screwsynth.nlp.output.report.markup import tag, with_signs
 from screwsynth.nlp.output.report.tables import html_table
 from screwsynth.nlp.results.rounding import FLAT
 from screwsynth.nlp.words.designs import design_values
@@ -69,7 +69,7 @@ def test_a_long_text_is_one_line_that_opens() -> None:
     ],
 )
 def test_negative_numbers_have_a_minus_sign_and_names_keep_their_hyphens(text: str, shown: str) -> None:
-    assert with_minus(text) == shown
+    assert with_signs(text) == shown
     assert tag("p", text) == f"<p>{shown}</p>"
     # A command is copied as it is.
     assert tag("code", text) == f"<code>{text}</code>"

@@ -521,3 +521,13 @@ def test_a_path_of_a_case_is_held_to_its_file(cli: Run, tmp_path: Path) -> None:
     saved(poses, "x,y,z\n0,0,20\n1,0,22\n")
     code, _, said = cli("verify-proof", str(out), str(case))
     assert (code, "another tool path" in said) == (1, True)
+
+
+def test_a_clearance_of_legs_that_meet_is_rejected(proof: Proof) -> None:
+    """The vector between the nearest points is 0 there: it separates nothing."""
+    given = next(each for each in proof.claims if each.name.startswith("leg_clearance"))
+    for own in (each for each in proof.unproved if each.name.startswith("leg_clearance")):
+        forged = replace(given, name=own.name, sense=own.sense, bound=0.05, tree=bytes([Node.BOUNDED] * 3), packed=None)
+        left = tuple(each for each in proof.unproved if each is not own)
+        message = rejected(replace(proof, claims=(*proof.claims, forged), unproved=left), machine())
+        assert message.startswith(own.name)

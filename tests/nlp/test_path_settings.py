@@ -1,5 +1,6 @@
 """Proofs along paths with settings, beside kinematics in NumPy: a turn about the tool, and a moving base radius."""
 
+import csv
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,20 +14,21 @@ from builders import Array, Run, case_from, case_of, commands_in, output_of, ref
 from measures import circle_joints
 from path_cases import BASE, LEGS, PLATFORM, extreme, hexapod, program, turns_of
 
-from screwsynth.nlp import Case, InputError, Judgement, Outcome, ProgrammedPath, Sense
+from screwsynth.nlp import Case, CaseError, InputError, Judgement, Outcome, ProgrammedPath, Sense
 from screwsynth.nlp.path.dividing import divided_path
 from screwsynth.nlp.path.options import Between, PathOptions
 from screwsynth.nlp.path.poses_csv import read_poses
 from screwsynth.nlp.path.reader import path_without_settings
 from screwsynth.nlp.path.settings import changing_of
 from screwsynth.nlp.path.waypoints import waypoints
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError
+from screwsynth.nlp.proof.checker.proof_file import PathPremises, Proof, ProofError
 from screwsynth.nlp.proof.checker.workspace.check import check_path_proof
 from screwsynth.nlp.proof.checker.workspace.path_poses import PathPoses
-from screwsynth.nlp.proof.checker.workspace.path_premises import premises_of
+from screwsynth.nlp.proof.checker.workspace.path_premises import carried_path, premises_of
 from screwsynth.nlp.proof.workspace.path_domain import covered
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.proof.workspace.path_proof_writer import path_proof_of
+from screwsynth.nlp.proof.workspace.path_samples import samples_of
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
 from screwsynth.nlp.solver.schedule.exchange import exchanged
 from screwsynth.nlp.solver.schedule.polish import polish
@@ -316,8 +318,8 @@ def test_commands_refuse_what_settings_do_not_support(
     text = unbroken(output_of(cli("path", file)))
     assert "PROVED at every point" in text
     assert "F locks x1; its drive has no force or power here" in text
-    refusal_of(cli("path", file, "--proof", "p.json"), "proof files do not support x1")
-    refusal_of(cli("path", file, "--csv", "j.csv"), "--csv: is not supported while x1")
+    refusal_of(cli("path", file, "--csv", "j.csv", "--within", "0.1"), "--within: is not proved while x1 changes")
+    assert not (tmp_path / "j.csv").exists()
     refusal_of(cli("path", file, "--along", "p.ngc"), "states no x1")
     home = moving(limits={"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}})
     file = str(saved(tmp_path / "home.toml", home.to_toml()))
@@ -395,3 +397,131 @@ def test_a_divided_path_has_the_same_poses() -> None:
         assert np.abs(one.positions - two.positions).max() < 1e-12
         assert np.abs(one.rotations - two.rotations).max() < 1e-12
         assert own.time == pytest.approx(path.time, rel=1e-12)
+
+
+def proof_along(case: Case, text: str) -> tuple[Proof, ProgrammedPath]:
+    """The proof of a table, with its path."""
+    path = read_poses(text, "s.csv", case.units, PathOptions(), changing_of(case))
+    record = ProofRecord()
+    found = judge_path(case, path, record=record)
+    return path_proof_of(case, found, record, "", premises_of(case, "s.csv", text, PathOptions(), of_case=False)), path
+
+
+#: Points with a moving base radius and with a turn: position, roll, pitch, yaw, radius x1, turn, time.
+BOTH_ROWS = ((-2, 1, 20, 0, 5, 0, 24, -20, 0), (3, 2, 21, 4, 0, 0, 26.5, 10, 5), (3, 2, 21, 4, 0, 0, 26, 5, 6))
+
+
+def both(**changes: object) -> Case:
+    """A hexapod whose base radius and turn change."""
+    whole = tables(**changes)
+    whole["robot"]["parameters"]["x1"] = {"min": 18, "max": 34, "per": "path", "rate": 0.5}
+    whole["path"] = {"file": "s.csv", "tool": {"axis": [0, 0, 1], "turn": {"min": -75, "max": 75, "rate": 20}}}
+    return case_from(whole)
+
+
+FORCES = {
+    "units": {"length": "in", "force": "lbf"},
+    "load": [{"name": "cut", "any": {"force": 20}}],
+    "limits": {"leg_length": {"min": 10, "max": 45}, "actuator_speed": {"max": 5}, "actuator_power": {"max": 500}},
+}
+
+
+@pytest.mark.parametrize("more", [{}, FORCES, {"limits": {"smallest_singular_value": {"min": 0.05, "length": 11}}}])
+@pytest.mark.parametrize("is_both", [False, True])
+def test_proofs_with_a_moving_dimension_are_checked(more: dict[str, Any], is_both: bool) -> None:
+    names = "x,y,z,roll,pitch,yaw,x1,turn,t" if is_both else "x,y,z,roll,pitch,yaw,x1,t"
+    case, rows = (both(**more), BOTH_ROWS) if is_both else (moving(**more), RADIUS_ROWS)
+    proof, path = proof_along(case, written(names, rows))
+    assert proof.unproved == ()
+    checked = check_path_proof(proof, case, path)
+    assert {each.name for each in checked.claims} >= {"regular", *(f"actuator_speed actuator {leg}" for leg in LEGS)}
+    # A bound a little nearer than the largest speed is not confirmed.
+    k = next(k for k, each in enumerate(proof.claims) if each.name == "actuator_speed actuator 1-")
+    assert proof.claims[k].bound is not None
+    less = replace(proof.claims[k], bound=0.95 * (proof.claims[k].bound or 0.0))
+    with pytest.raises(ProofError, match="1-"):
+        check_path_proof(replace(proof, claims=(*proof.claims[:k], less, *proof.claims[k + 1 :])), case, path)
+
+
+def test_a_proof_takes_no_setting_from_its_file() -> None:
+    case = moving()
+    text = written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS)
+    proof, _ = proof_along(case, text)
+    assert isinstance(proof.premises, PathPremises)
+    # The trees do not prove the claims for another radius.
+    rows = [RADIUS_ROWS[0], (*RADIUS_ROWS[1][:6], 25.9, 5)]
+    with pytest.raises(ProofError):
+        check_path_proof(proof, case, path_of(case, "x1", rows))
+    # A file whose text has a radius out of the range of the case, or that changes too fast, is rejected.
+    for old, new, fault in (("26.5", "34.5", "above its max 34"), ("26.5,5.0", "26.5,4.9", "more than its rate 0.5")):
+        altered = replace(proof.premises, text=text.replace(old, new))
+        with pytest.raises(ProofError, match=fault):
+            carried_path(case, altered)
+    # A case without the setting has no use for the file.
+    with pytest.raises(ProofError):
+        check_path_proof(proof, case.replace(x1=26), path_of(case.replace(x1=26), "x1", RADIUS_ROWS))
+
+
+def test_a_claim_about_a_clearance_is_rejected_while_a_dimension_changes() -> None:
+    case = moving(limits={"leg_clearance": {"min": 0.5}})
+    proof, path = proof_along(case, written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS))
+    name = "leg_clearance limbs 1+ and 2-"
+    (own,) = [each for each in proof.unproved if each.name == name]
+    some = next(each for each in proof.claims if each.reason == "boxes")
+    forged = replace(some, name=name, sense=own.sense, bound=0.5)
+    left = tuple(each for each in proof.unproved if each is not own)
+    with pytest.raises(ProofError, match="leg clearances cannot be proved"):
+        check_path_proof(replace(proof, claims=(*proof.claims, forged), unproved=left), case, path)
+
+
+def test_tables_curves_and_pages_have_the_settings(cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.csv").write_text(written("x,y,z,roll,pitch,yaw,x1,turn,t", BOTH_ROWS))
+    file = str(saved(Path("case.toml"), both().to_toml()))
+    output_of(cli("path", file, "--csv", "joints.csv", "--step", "0.5", "--plot", "path.svg", "--html", "page.html"))
+    output_of(cli("path", file, "--proof", "proof.json"))
+    output_of(cli("verify-proof", "proof.json", file))
+    with Path("joints.csv").open() as opened:
+        table = [{key: float(cell or "nan") for key, cell in row.items()} for row in csv.DictReader(opened)]
+    columns = {key: np.array([row[key] for row in table]) for key in table[0]}
+    assert [*columns][-2:] == ["rate turn", "rate x1"]
+    k, s = columns["segment"].astype(int), columns["parameter"]
+    whole = np.array(BOTH_ROWS, dtype=float)
+    at = whole[k] + s[:, None] * (whole[k + 1] - whole[k])
+    for j, name in enumerate(("x", "y", "z", "roll", "pitch", "yaw", "x1", "turn", "t")):
+        assert columns[name] == pytest.approx(at[:, j], abs=1e-9)
+    R = turns_of(np.radians(at[:, 3:6])) @ turns_of(np.radians(np.column_stack([0 * s, 0 * s, at[:, 7]])))
+    base = circle_joints({"x1": 1.0, "x2": 11.543, "x3": 0.0, "x4": math.radians(5)})[0] * at[:, 6, None, None]
+    legs = np.linalg.norm(at[:, None, :3] + np.einsum("nij,kj->nki", R, PLATFORM) - base, axis=2)
+    assert np.column_stack([columns[f"leg_length {leg}"] for leg in LEGS]) == pytest.approx(legs, abs=1e-9)
+    seconds = whole[k + 1, 8] - whole[k, 8]
+    for j, name in ((6, "rate x1"), (7, "rate turn")):
+        assert math.isnan(columns[name][0])
+        assert columns[name][1:] == pytest.approx(((whole[k + 1, j] - whole[k, j]) / seconds)[1:], abs=1e-12)
+    # Speeds between rows are differences of the lengths.
+    assert columns["speed 1-"][1:] == pytest.approx(np.diff(legs[:, 0]) / np.diff(columns["t"]), abs=1e-6)
+    svg, page = Path("path.svg").read_text(), Path("page.html").read_text()
+    for name in ("x1", "turn", "rate of x1", "rate of turn"):
+        assert f'id="{name} {name.rpartition(" ")[2]}"' in svg
+        assert f"{name[0].upper()}{name[1:]} from" in page
+    assert "the live view does not move x1 along a path" in page
+
+
+def test_curves_of_speeds_have_the_motion_of_the_dimension() -> None:
+    found = samples_of(judged("x1"))
+    assert found.joints is not None
+    s, h = found.points.parameters, 1e-6
+    assert found.joints.coordinates == pytest.approx(lengths(RADIUS_ROWS, 0, s, "x1"), abs=1e-10)
+    speeds = (lengths(RADIUS_ROWS, 0, s + h, "x1") - lengths(RADIUS_ROWS, 0, s - h, "x1")) / (2 * h * 5)
+    assert found.speeds == pytest.approx(speeds, abs=1e-7)
+
+
+def test_a_schedule_that_cannot_be_proved_is_refused_before_its_search(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("s.csv").write_text(written("x,y,z,roll,pitch,yaw,t", [(*row[:6], row[7]) for row in RADIUS_ROWS]))
+    angles = {"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}}
+    assert len(schedule_problem(moving(limits=angles)).points)
+    with pytest.raises(CaseError, match="home has no x1, which changes along the path"):
+        schedule_problem(moving(limits=angles | {"over": "path"}))

@@ -1,7 +1,10 @@
 """Settings for every pose of a workspace, against kinematics written here: affine, and existence."""
 
 import json
+import math
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +15,14 @@ from jsonschema import Draft202012Validator
 
 from screwsynth.nlp import Case, CaseError, Free, Outcome, case_text, load_case, solve
 from screwsynth.nlp.case.pose import PerPose, ends_of
-from screwsynth.nlp.case.workspace import PoseSettings
+from screwsynth.nlp.case.workspace import PoseSettings, Workspace
+from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
+from screwsynth.nlp.proof.checker.tree import Node
+from screwsynth.nlp.proof.checker.workspace.settings_check import check_settings_proof
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.judgement import Judgement
 from screwsynth.nlp.proof.workspace.pose_settings import prove_settings
+from screwsynth.nlp.proof.workspace.settings_proof_writer import settings_proof_of
 from screwsynth.nlp.results.schema import result_schema
 
 NAME = "hexapod-base-slides"
@@ -253,6 +260,8 @@ POSE: dict[str, object] = {"min": 20, "max": 32, "per": "pose"}
         (POSE, "affine", {"tolerance": {"joint_centre": 0.01}}, "tolerance.joint_centre: is not supported"),
         (POSE, "affine", {"limits": {"footprint": {"base": 30}}}, "limits.footprint: is not supported"),
         (POSE, "affine", {"limits": {"actuator_speed": {"max": 3}}}, "limits.actuator_speed: is not supported"),
+        # A stroke compares poses, and each box of poses has its own setting.
+        (POSE, "any", {"limits": {"actuator": {"stroke_max": 1}}}, "limits.actuator: is not supported with settings"),
         (
             POSE,
             "any",
@@ -267,15 +276,16 @@ def test_bad_settings_are_refused(x1: object, settings: str | None, tables: dict
     assert words in str(found.value)
 
 
-def test_mounting_poses_need_stated_settings() -> None:
+@pytest.mark.parametrize("settings", ["affine", "any"])
+def test_mounting_poses_need_stated_settings(settings: str) -> None:
     limits = {"base_joint_angle": {"max": 30, "about": "home"}, "home": {"position": [0, 0, 20]}}
     with pytest.raises(CaseError, match=r"base_joint_angle.about: must not be 'home'"):
-        case_from(tables_of(RANGE, 4.2, "affine", limits=limits), "slides")
+        case_from(tables_of(RANGE, 4.2, settings, limits=limits), "slides")
 
 
 def test_commands_refuse_what_they_cannot_do_with_settings(cli: Run, tmp_path: Path) -> None:
     any_file = str(case_file(tmp_path, tables_of(RANGE, 4.2, "any"), "any.toml"))
-    for option in ("--proof", "--html", "--plot"):
+    for option in ("--html", "--plot"):
         target = tmp_path / "out.json"
         refusal_of(cli("workspace", any_file, option, str(target)), f"{option}: is not supported with settings")
         assert not target.exists()
@@ -298,3 +308,131 @@ def test_a_robot_given_by_joints_has_settings_for_any_pose_only() -> None:
         case_from(tables, "delta")
     tables["workspace"]["settings"] = "any"
     assert prove_settings(case_from(tables, "delta")).outcome is Outcome.PROVED
+
+
+#: Rotations besides the positions of a cube.
+TURNS: dict[str, object] = {"yaw": {"min": -6, "max": 6}, "pitch": {"min": -3, "max": 3}, "roll": 0}
+
+
+def turned_tables(half: float, **limits: object) -> dict[str, Any]:
+    """The tables of a cube with rotations, whose settings are any values."""
+    found = tables_of(POSE, half, "any", limits={"leg_length": {"min": SHORT, "max": LONG}} | limits)
+    found["workspace"]["rotation"] = TURNS
+    return found
+
+
+@cache
+def proof_of_settings(half: float, limit: float) -> tuple[Case, Proof]:
+    """The proof of settings for a cube with rotations, and with a limit on singular values."""
+    tables = turned_tables(half, smallest_singular_value={"min": limit, "length": 11.5}, footprint={"base": 30})
+    case = case_from(tables, "slides")
+    found = prove_settings(case)
+    assert found.is_proved
+    return case, settings_proof_of(found, "")
+
+
+def test_a_proof_of_settings_is_checked_box_by_box() -> None:
+    case, proof = proof_of_settings(3.6, 0.2)
+    (claim,) = proof.claims
+    assert len(claim.sides) > 4
+    again = read_proof(proof.as_text(), "again")
+    checked = check_settings_proof(again, case)
+    assert checked.leaves == len(claim.sides)
+    # The boxes cover every pose, and their settings keep the lengths there, by kinematics of this test.
+    rng, count = np.random.default_rng(5), 20_000
+    low, high = (np.array(each) for each in ((-3.6, -3.6, 16.4, 0, -3, -6), (3.6, 3.6, 23.6, 0, 3, 6)))
+    y = rng.uniform(low, high, (count, 6))
+    y[::2] = np.where(rng.random((len(y[::2]), 6)) < 0.5, low, high)
+    y[:, 3:] = np.radians(y[:, 3:])
+    ends = [box_ends(each.workspace) for each in prove_settings(case).boxes]
+    reached = np.zeros(count, dtype=bool)
+    for (lower, upper), values in zip(ends, claim.sides, strict=True):
+        inside = ((y >= lower - 1e-15) & (y <= upper + 1e-15)).all(axis=1)
+        legs = turned_lengths(np.full(inside.sum(), values[0]), y[inside])
+        assert legs.max(initial=SHORT) <= LONG + 1e-9
+        assert legs.min(initial=LONG) >= SHORT - 1e-9
+        reached |= inside
+    assert reached.all()
+
+
+def box_ends(workspace: Workspace) -> tuple[Array, Array]:
+    """Ends (6,) of position, roll, pitch and yaw of a box."""
+    lower, upper = np.array([ends_of(each) for each in (*workspace.position, *workspace.turns.angles)]).T
+    return lower, upper
+
+
+def turned_lengths(x1: Array, y: Array) -> Array:
+    """Lengths (P, 6) of the legs at positions with roll, pitch and yaw (P, 6)."""
+    (a, b, c), (d, e, f) = np.cos(y[:, 3:]).T, np.sin(y[:, 3:]).T
+    rows = [
+        [c * b, c * e * d - f * a, c * e * a + f * d],
+        [f * b, f * e * d + c * a, f * e * a - c * d],
+        [-e, b * d, b * a],
+    ]
+    R, ends = np.moveaxis(np.array(rows), 2, 0), []
+    for k in range(3):
+        base = np.radians(120 * k)
+        for turn in (-1, 1):
+            joint = base + turn * np.radians(60 - 5)
+            arm = PLATFORM * R @ np.array([np.cos(joint), np.sin(joint), 0.0])
+            ends.append(np.linalg.norm(y[:, :3] + arm - x1[:, None] * [np.cos(base), np.sin(base), 0.0], axis=1))
+    return np.stack(ends, axis=1)
+
+
+ALTERED: list[tuple[str, dict[str, Any], str]] = [
+    ("a value out of its range", {"sides": (33.0,)}, "that the case does not allow"),
+    ("not a number", {"sides": (math.nan,)}, "that the case does not allow"),
+    ("a value that fails", {"sides": (20.0,)}, "could not be proved"),
+    ("no value", {"sides": None}, "value of each setting for each box"),
+    ("a value too many", {"sides": (25.0, 25.0)}, "value of each setting for each box"),
+    ("a box too few", {"tree": slice(0, -1)}, "incomplete"),
+    ("a box that is called outside", {"tree": Node.OUTSIDE}, "node OUTSIDE"),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "words"), ALTERED)
+def test_altered_proofs_of_settings_are_rejected(name: str, change: dict[str, Any], words: str) -> None:
+    assert name
+    case, proof = proof_of_settings(3.6, 0.2)
+    (claim,) = proof.claims
+    if "sides" in change:
+        rest = claim.sides[1:]
+        claim = replace(claim, sides=rest if change["sides"] is None else (change["sides"], *rest))
+    elif isinstance(change["tree"], slice):
+        claim = replace(claim, tree=claim.tree[change["tree"]])
+    else:
+        claim = replace(claim, tree=claim.tree[:-1] + bytes([change["tree"]]))
+    with pytest.raises(ProofError, match=words):
+        check_settings_proof(replace(proof, claims=(claim,)), case)
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [turned_tables(3.7), turned_tables(3.6, leg_length={"min": 25.5, "max": 34}), tables_of(RANGE, 3.6, "any")],
+)
+def test_proofs_of_settings_are_about_their_case(tables: dict[str, Any]) -> None:
+    _, proof = proof_of_settings(3.6, 0.2)
+    with pytest.raises(ProofError):
+        check_settings_proof(proof, case_from(tables, "slides"))
+
+
+def test_commands_write_and_check_proofs_of_settings(cli: Run, tmp_path: Path) -> None:
+    proof = tmp_path / "proof.json"
+    file = str(case_file(tmp_path, tables_of(RANGE, 3.0, "any"), "any.toml"))
+    output_of(cli("workspace", file, "--proof", str(proof)))
+    text = unbroken(output_of(cli("verify-proof", str(proof), file)))
+    assert "PROOF VALID: 1 of 1 claims about the workspace of any" in text
+    assert "every pose has a value of each setting that satisfies all limits" in text
+    # A claim that is not proved writes no file.
+    missing = tmp_path / "missing.json"
+    large = str(case_file(tmp_path, tables_of(RANGE, 4.4, "any"), "large.toml"))
+    assert cli("workspace", large, "--proof", str(missing))[0] == 1
+    assert not missing.exists()
+    code, _, err = cli("verify-proof", str(proof), large)
+    assert (code, "rejected" in err) == (1, True)
+    # The proof of a fixed setting is no proof of this claim.
+    fixed = tmp_path / "fixed.json"
+    one = str(case_file(tmp_path, tables_of(25.3, 2.0, None), "one.toml"))
+    output_of(cli("workspace", one, "--proof", str(fixed)))
+    code, _, err = cli("verify-proof", str(fixed), file)
+    assert (code, "one claim" in err) == (1, True)

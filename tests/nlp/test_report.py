@@ -197,12 +197,12 @@ def test_slices_keep_unit_vectors() -> None:
 
 def test_a_page_shows_curves_where_slices_would_show_little(page: Callable[..., Page]) -> None:
     text = page("hexapod-machining").text
-    for key in ("limits.footprint.platform", "limits.footprint.base", "limits.leg_length.min"):
-        assert f"<caption>{key} from " in text
+    for key in ("footprint platform", "footprint base", "minimum leg length"):
+        assert f"<caption>Values: {key} from " in text
     assert "no point of it keeps every limit" not in text
     assert "the only one of its points within them" not in text
     # Around this point there is room.
-    assert "<caption>limits." not in page("paper-4.1-helical").text
+    assert "<caption>Values: " not in page("paper-4.1-helical").text
 
 
 def test_planes_are_f() -> None:
@@ -356,17 +356,19 @@ def test_structure_is_accessible(page: Callable[..., Page]) -> None:
 
 def test_contrast() -> None:
     style = (Path(__file__).parents[2] / "nlp" / "output" / "report" / "page" / "style.css").read_text(encoding="utf-8")
-    colours = dict(re.findall(r"--(ink|muted|blue|pale): (#[0-9a-f]{6})", style))
-    (warning,) = re.findall(r"\.warning {[^}]*[^-]color: (#[0-9a-f]{6})", style)
+    light_scheme, dark_scheme = style.split("@media screen and (prefers-color-scheme: dark)")[:2]
 
     def light(colour: str) -> float:
         parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
         linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
         return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
-    for colour in (colours["ink"], colours["muted"], colours["blue"], warning):
-        for ground in ("#ffffff", colours["pale"]):
-            assert (light(ground) + 0.05) / (light(colour) + 0.05) >= 4.5
+    for scheme in (light_scheme, dark_scheme.split("}")[0]):
+        colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6})", scheme))
+        for name in ("ink", "muted", "blue", "bad", "edge", "good"):
+            for ground in ("back", "pale"):
+                pair = sorted([light(colours[name]) + 0.05, light(colours[ground]) + 0.05])
+                assert pair[1] / pair[0] >= 4.5, (name, ground)
 
 
 def test_colours_are_those_of_picture_files() -> None:

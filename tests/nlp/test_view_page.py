@@ -219,6 +219,18 @@ def test_texts_of_a_case_stay_texts(live: Callable[..., Live], tmp_path: Path) -
     assert len(html.scripts) == 3
 
 
+#: Roles of elements that people operate or that stand for a picture.
+CONTROLS = ("button", "slider", "textbox", "combobox", "image", "img", "application", "link", "DisclosureTriangle")
+
+
+def unnamed_controls(page: Live) -> list[dict[str, Any]]:
+    """Controls without a name in the tree that Chromium gives to screen readers."""
+    nodes = page.chrome.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    shown = [each for each in nodes if not each["ignored"] and each["role"]["value"] in CONTROLS]
+    assert len(shown) > 10
+    return [each for each in shown if not str(each["name"]["value"]).strip()]
+
+
 @needs_compiler
 @pytest.mark.browser
 def test_a_narrow_page_by_keyboard(live: Callable[..., Live]) -> None:
@@ -234,12 +246,7 @@ def test_a_narrow_page_by_keyboard(live: Callable[..., Live]) -> None:
     slider.send_keys("\ue012\ue012")
     page.chrome.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
     assert before != page.F
-    unnamed = page.chrome.execute_script(
-        "return [...document.querySelectorAll('button, input, select, canvas')]"
-        ".filter((each) => !(each.textContent.trim() || each.getAttribute('aria-label') || each.labels?.length))"
-        ".map((each) => each.outerHTML)"
-    )
-    assert unnamed == []
+    assert unnamed_controls(page) == []
     entry.clear()
     entry.send_keys("many\ue007")
     assert entry.get_attribute("aria-invalid") == "true"
@@ -463,6 +470,82 @@ def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_
     assert cli("evaluate", file, "--json", str(target))[0] in (0, 1)
     again = [each["F"] for each in json.loads(target.read_text())["tasks"]]
     assert again == pytest.approx(values, rel=1e-9)
+
+
+#: Two tasks at two poses; F of a task is the mean over both.
+TWO_BY_TWO = """
+title = "two tasks, two poses"
+units = { length = "cm" }
+pose = [{ position = [0, 0, { min = 15, max = 30 }] }, { position = [3, 1, 22], angle = 5, axis = [1, 0, 0] }]
+combine = { method = "worst-case", over_poses = "mean" }
+solve = { starts = 4 }
+[[task]]
+name = "lift"
+sense = "max"
+axis = [0, 0, 1]
+pitch = inf
+[[task]]
+name = "turn"
+sense = "max"
+axis = [0, 0, 1]
+point = [0, 0, 0]
+pitch = 0
+[robot]
+model = "stewart-gough"
+parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = { min = 5, max = 40 } }
+"""
+#: F of a task, and its separate optimum if it is known.
+TASK_VALUE = re.compile(r"^(.+): F = (\S+) \S+?(?:, (\S+) % of the separate (maximum|minimum) (\S+))?$")
+
+
+def task_values(page: Live) -> list[re.Match[str]]:
+    """Values of the tasks in the headline."""
+    rows = page.chrome.execute_script(
+        "return [...document.querySelectorAll('#task-values li')].map((e) => e.textContent)"
+    )
+    found = [TASK_VALUE.match(row) for row in rows]
+    assert all(found), rows
+    return [each for each in found if each is not None]
+
+
+@needs_compiler
+@pytest.mark.browser
+@pytest.mark.parametrize("name", ["peg-in-hole", "two tasks at two poses"])
+def test_the_headline_has_each_task_as_a_part_of_its_own_optimum(
+    live: Callable[..., Live], cli: Run, tmp_path: Path, name: str
+) -> None:
+    source = name if name == "peg-in-hole" else str(saved(tmp_path / "two.toml", TWO_BY_TWO))
+    page = live(source)
+    solution = solve(load_case(source))
+    for row, outcome in zip(task_values(page), solution.outcomes, strict=True):
+        task, F, part, word, best = row.groups()
+        assert (task, word) == (outcome.task.name, f"{outcome.task.sense.value}imum")
+        assert float(F) == pytest.approx(outcome.F, rel=1e-6)
+        assert float(best) == pytest.approx(outcome.own.F, rel=1e-6)
+        assert float(part) == pytest.approx(100 * outcome.F / outcome.own.F, rel=1e-3)
+    # A moved value changes F, and no separate optimum.
+    page.click("mode-evaluate")
+    page.move("p_z" if name == "peg-in-hole" else "pose1_p_z", 23.0)
+    target = tmp_path / "evaluated.json"
+    assert cli(*shlex.split(page.copied("copy-set"))[1:], "--json", str(target))[0] in (0, 1)
+    expected = [each["F"] for each in json.loads(target.read_text())["tasks"]]
+    moved = task_values(page)
+    assert [float(each[2]) for each in moved] == pytest.approx(expected, rel=1e-6)
+    assert all(each[5] for each in moved)
+    # The separate optima of another robot are not known.
+    page.move("x1" if name != "peg-in-hole" else "p_y", 11.0)
+    fixed = page.chrome.execute_script("return screwsynth.state.isStatedCase()")
+    assert [bool(each[5]) for each in task_values(page)] == [fixed, fixed]
+    assert fixed is False
+    assert page.faults == []
+
+
+@pytest.mark.browser
+def test_a_page_without_a_solver_and_an_answer_has_the_value_of_its_point(live: Callable[..., Live]) -> None:
+    page = live("differential-waist")
+    assert_words(*page.shown("F", "word", "words"), "F = ", "point", "nothing is optimised")
+    assert page.shown("task-values") == [""]
+    assert page.faults == []
 
 
 def copied_case(page: Live, folder: Path) -> str:

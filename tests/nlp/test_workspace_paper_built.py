@@ -111,7 +111,7 @@ def test_claims_of_every_kind_about_every_machine_hold(both: tuple[Judgement, Pr
 
 def rejections(proof: Proof, text: str = TEXT) -> Callable[..., str]:
     """The check of one claim after the other, with other values in it: a function that returns why it is rejected."""
-    checker = check._Checker(proof, case_of(text), stated(proof).leg_error)
+    checker = check.WorkspaceChecker(proof, case_of(text), stated(proof).leg_error)
     expected = {each.label: each for each in checker.expected}
 
     def reject(name: str, sense: str, **values: Any) -> str:  # noqa: ANN401

@@ -26,9 +26,9 @@ from casadi import SX
 
 from ... import Closure, Dimension, Model, Substitution, Unknown
 from ...drawing import Scene
-from ...instance import length_of
+from ...instance import joint_sizes, length_of
 from ...whole import expressions_of, with_expressions
-from .elimination import limb_of
+from .elimination import eliminated, limb_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest relative difference of both sides of an identity at random values: rounding.
@@ -119,6 +119,25 @@ def closed_form(model: Model, *, extended: bool = False, with_angles: bool = Tru
     return ClosedForm(_rewritten(model, found, kept), tuple(reaches), with_angles)
 
 
+def eliminated_form(model: Model) -> ClosedForm:
+    """Return a robot without the unknowns that follow one after the other from its loop equations.
+
+    The solutions are those of the home working mode, also for limbs with several unknowns, such as those of planar
+    robots; see :mod:`.elimination`. The loop equations stay in the model: its constraints on the pose are in them.
+
+    Args:
+        model: the robot, without free actuator coordinates.
+    """
+    found = eliminated(model)
+    solved = {each.place: each.solved for each in found if each.solved is not None}
+    reaches = tuple(
+        Reach(limb_of(each.root.equation) or model.unknowns[each.place].name, each.root.reach)
+        for each in found
+        if each.root is not None
+    )
+    return ClosedForm(_rewritten(model, solved, model.closure) if solved else model, reaches)
+
+
 def with_joints_at_home(model: Model) -> Model:
     """Return a robot with its free actuator coordinates fixed at home, without its drawing."""
     held = {
@@ -199,9 +218,11 @@ def _is_same(model: Model, one: SX, other: SX) -> bool:
     function = ca.Function("two", symbols, [ca.densify(one), ca.densify(other)])
     rng = np.random.default_rng(_SEED)
     typical, size = model.typical, length_of(model, model.typical.tolist())
+    joints = joint_sizes(model)
     lengths = np.array([size if item.dimension is Dimension.LENGTH else 1.0 for item in model.unknowns])
     for _ in range(_TESTS):
-        values = typical * rng.uniform(0.8, 1.2, typical.shape)
+        # Joint coordinates as parameters are 0 at home, which would hide terms.
+        values = typical * rng.uniform(0.8, 1.2, typical.shape) + joints * rng.uniform(-1.5, 1.5, typical.shape)
         turn = rng.normal(size=(3, 3))
         place = np.array(model.home) + size * rng.uniform(-0.5, 0.5, 3)
         unknowns = lengths * rng.uniform(-1.5, 1.5, symbols[1].numel())

@@ -29,7 +29,7 @@ import numpy as np
 from casadi import SX
 
 from ... import Dimension, FloatArray, Model, Substitution, Unknown
-from ...instance import length_of
+from ...instance import joint_sizes, length_of
 from .replacing import Solved, at_turn, with_replaced
 
 #: Largest relative difference of both sides of an identity at random values: rounding.
@@ -323,6 +323,7 @@ def _points(model: Model, rotation: FloatArray | None) -> list[list[FloatArray]]
         turn = turn * np.sign(np.diag(turn)) if rotation is None else rotation
         unknowns = rng.uniform(-1.5, 1.5, len(model.unknowns)) * np.where(lengths, size, 1.0)
         values = typical * (1 + _SPREAD * rng.uniform(-1, 1, typical.shape))
+        values += _SPREAD * joint_sizes(model) * rng.uniform(-1, 1, typical.shape)
         points.append([values, unknowns, turn, home + _SPREAD * size * rng.uniform(-1, 1, 3)])
     return points
 

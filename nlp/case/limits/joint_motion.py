@@ -16,11 +16,11 @@ import abc
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import casadi as ca
 from casadi import SX
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, model_validator
 
 from ....models import Dimension, Model
 from ....models.legs import angle_between
@@ -28,7 +28,9 @@ from ....models.limbjoints import JointCone as Cone
 from ....models.limbjoints import JointCoordinate, LimbJoint
 from ...errors import CaseError, listing
 from ...units import Units
-from ..table import Table, Vector
+from ..checks import check_rate
+from ..pose import MISSING_RATE
+from ..table import Table, Vector, fault_of
 from ..toml import TomlValue
 from .constraint import LENGTH, BoundedConstraint, Reading, between
 from .interval import IntervalTable, two_sided
@@ -44,6 +46,14 @@ _LISTED = 12
 class JointTable(IntervalTable):
     """Range of a joint coordinate from home, or cone of a joint."""
 
+    per: Literal["path"] | None = Field(
+        default=None,
+        description="path: a driven joint that the pose does not determine changes along the tool path; with "
+        "objective.over = 'path', the same coordinate everywhere if left out",
+    )
+    rate: float | None = Field(
+        default=None, description="largest change per second of a joint with per = 'path'; inf for no limit"
+    )
     first: IntervalTable | None = Field(
         default=None, description="range of the angle about the first axis of a universal joint, from home"
     )
@@ -62,6 +72,17 @@ class JointTable(IntervalTable):
     axis: Vector | None = Field(
         default=None, description="axis of the cone, in the home configuration; the direction of the link if left out"
     )
+
+    @model_validator(mode="after")
+    def _refuse_rate_alone(self) -> JointTable:
+        """Refuse a change along the path without range or rate, and a rate without a change along the path."""
+        if self.per is None and self.rate is not None:
+            raise fault_of("rate", 'has an effect only with per = "path"')
+        if self.per is not None and (self.min is None or self.max is None):
+            raise fault_of("per", "needs min and max of the joint")
+        if self.per is not None and self.rate is None:
+            raise fault_of("rate", MISSING_RATE)
+        return self
 
 
 class StatedMotion(NamedTuple):
@@ -160,6 +181,8 @@ class JointMotion(LimitOnJoint):
             or ``"stroke"`` for a cylindrical joint; empty for other joints.
         min: smallest allowed coordinate, radians or length; None for no lower limit.
         max: largest allowed coordinate, radians or length; None for no upper limit.
+        rate: largest change per second, radians or length, of a driven joint that the pose does not determine and that
+            changes along the tool path; infinite for no limit. None for a joint that does not change by itself.
     """
 
     joint: str
@@ -167,6 +190,7 @@ class JointMotion(LimitOnJoint):
     _: KW_ONLY
     min: float | None = None
     max: float | None = None
+    rate: float | None = None
 
     key: ClassVar[str] = "joint"
     table: ClassVar[Any] = dict[str, JointTable]
@@ -196,11 +220,15 @@ class JointMotion(LimitOnJoint):
         dimensions = (one.dimension for each in known for one in each.coordinates if one.part == part)
         allowed = NumberRange(next(dimensions, Dimension.LENGTH))
         interval = getattr(table, part) if part else table
-        return cls(joint, part, **written.numbers(two_sided(allowed), interval))
+        rate = None if part or table.rate is None else written.internal(table.rate, allowed.dimension)
+        return cls(joint, part, **written.numbers(two_sided(allowed), interval), rate=rate)
 
     def to_keys(self, model: Model, units: Units) -> Mapping[str, TomlValue]:
         """Return the keys of ``[limits]`` that state this limit."""
         (interval,) = super().to_keys(model, units).values()
+        if self.rate is not None and isinstance(interval, Mapping):
+            rate = units.written(self.rate, self.ranges(model)["max"].dimension)
+            interval = {**interval, "per": "path", "rate": rate}
         return {self.key: {self.joint: {self.part: interval} if self.part else interval}}
 
     def ranges(self, model: Model) -> Ranges:
@@ -219,6 +247,28 @@ class JointMotion(LimitOnJoint):
         dimension = found.pop()
         largest = math.pi if dimension is Dimension.ANGLE else math.inf
         return two_sided(NumberRange(dimension, above=-math.inf, most=largest, least=-largest))
+
+    def check(self, case: LimitedCase) -> None:
+        """Check range and rate, and that the pose does not determine a joint with a rate.
+
+        Raises:
+            CaseError: a value is not allowed, or a joint with a rate is passive or follows from the pose.
+        """
+        super().check(case)
+        if self.rate is None:
+            return
+        key, model = f"limits.{self.name}", case.model
+        check_rate(self.rate, f"{key}.rate", self.ranges(model)["max"].dimension, case.units)
+        if self.min is None or self.max is None:
+            raise CaseError(f"{key}.per", "needs min and max of the joint", "path")
+        free = model.undetermined
+        driven = [each.joint for each in model.actuators]
+        for joint in self.joints(model):
+            if joint.label not in free:
+                why = "follows from the pose" if joint.label in driven else "is not actuated"
+                allowed = f"allowed: {listing(free)}" if free else "this robot has none"
+                fault = f"joint {joint.label} {why}; only actuated joints that the pose does not determine can change"
+                raise CaseError(f"{key}.per", f"{fault} along the path; {allowed}", "path")
 
     @property
     def name(self) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ....models import FloatArray
 from ....models.mechanism import Mechanism, MechanismJoint, MechanismLink
-from ..frames import quaternion_of
+from ....models.rotation import quaternion_from_matrix
 from .numbers import direction, number, numbers, plain_name
 from .shapes import MARK, PIN, ROD, extent, shape_of
 from .tree import Edge, spanning_tree
@@ -214,5 +214,5 @@ def _placed(link: MechanismLink, parent: MechanismLink | None) -> dict[str, str]
     turn: FloatArray = np.eye(3) if parent is None else parent.rotation
     return {
         "pos": numbers(turn.T @ (link.position - origin)),
-        "quat": direction(quaternion_of(turn.T @ link.rotation)),
+        "quat": direction(quaternion_from_matrix(turn.T @ link.rotation)),
     }

@@ -13,13 +13,14 @@ from ...results.result import result_of
 from ...results.tradeoff import TradeoffResult
 from ...solver.certified import Certified
 from ...solver.solution import Solution
-from ...view.source import view_source, view_without_solver
+from ...view.source import view_or_drawing
 from ..files import check_target, write_bytes
 from ..pictures.requirements import check_library
-from ..report.markup import LiveView, Markup, join_markup, tag
+from ..report.markup import LiveView, Markup, join_markup, no_live_view, tag
 from ..report.report import report_of
 from ..report.webpage import page_of
 from .page import SCRIPTS, LiveParts, live_parts, script_text
+from .schedule import schedule_parts
 
 _WRITTEN = "# Case file written by Case.to_toml().\n"
 _NO_CASE_FILE = "No case file can represent this case: "
@@ -28,14 +29,13 @@ _NO_CASE_FILE = "No case file can represent this case: "
 def embedded(parts: LiveParts) -> LiveView:
     """Return the live view for another page; without a module, only the reason."""
     if parts.fault:
-        return LiveView(tag("p", f"This page has no sliders: {parts.fault}.", class_="note"), is_live=False)
+        return no_live_view(parts.fault)
     headline = tag("div", parts.answer, id="answer", class_="answer", role="status", aria_live="polite")
     content = [tag("style", parts.style), parts.task, headline, tag("div", parts.body, class_="live-main")]
     script = script_text(("embed.js", *SCRIPTS))
     return LiveView(
         join_markup(
             [
-                tag("div", id="live"),
                 tag("template", *content, tag("footer", parts.footer), id="live-markup"),
                 tag("script", parts.data, type="application/json", id="live-data"),
                 tag("script", Markup(parts.module), type="text/plain", id="live-module"),
@@ -54,17 +54,12 @@ def live_view_of(solution: Solution, command: str) -> LiveView:
         command: name of the case on the command line.
     """
     case = solution.chosen_case
-    if solution.case.over_path is not None:
-        words = "This page has no sliders: its robot changes along the path."
-        return LiveView(tag("p", words, class_="note"), is_live=False)
     try:
-        source = view_source(case)
-    except CaseError as error:
-        source = view_without_solver(case, error)
-    try:
-        return embedded(live_parts(source, solution, command))
+        if solution.case.over_path is not None:
+            return embedded(schedule_parts(solution, command))
+        return embedded(live_parts(view_or_drawing(case), solution, command))
     except InputError as error:
-        return LiveView(tag("p", f"This page has no sliders: {error}.", class_="note"), is_live=False)
+        return no_live_view(str(error))
 
 
 def report(

@@ -23,7 +23,7 @@ from ...evidence.state import evaluate
 from ...program.formulation import formulate
 from ...program.nlp import Nlp
 from ...program.places import FreeRotation
-from ...results.data import SolveResult
+from ...results.data import OutcomeData, SolveResult
 from ...results.objective import unit_of_objective
 from ...results.result import result_of
 from ...solver.solution import Solution
@@ -56,6 +56,7 @@ SCRIPTS = (
     "jumps.js",
     "map.js",
     "play.js",
+    "schedule.js",
     "track.js",
     "main.js",
 )
@@ -84,10 +85,16 @@ class Track:
     Attributes:
         x: (n,) variables at the first shown posture.
         data: data of the script: postures, path, violations, and curves at each posture.
+        names: settings that change along the path, whose sliders are those of the track.
+        answer: headline of the page before its script starts.
+        task: motions of the tasks in words.
     """
 
     x: FloatArray
     data: dict[str, Any]
+    names: tuple[str, ...] = ()
+    answer: str = ""
+    task: tuple[Line, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,9 +143,9 @@ class LiveParts:
     size: int
 
 
-def live_page(source: ViewSource, solution: Solution | None, command: str) -> LivePage:
+def live_page(source: ViewSource, solution: Solution | None, command: str, track: Track | None = None) -> LivePage:
     """Return the live page of a case; the arguments are those of :func:`live_parts`."""
-    parts = live_parts(source, solution, command)
+    parts = live_parts(source, solution, command, track)
     case = source.subject.nlp.case
     texts = {name: getattr(parts, name) for name in _PIECES}
     title = tag("title", f"{case.title or case.name} - screwsynth")
@@ -168,6 +175,9 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     if track is not None:
         # The range of rotations is only that of the path.
         data["rows"] = [each for each in data["rows"] if each["name"] != "angle"]
+        for slider in data["sliders"]:
+            if slider["name"] in track.names:
+                slider["group"] = "setting"
     page = {
         **data,
         "scene": _scene(drawing),
@@ -194,8 +204,8 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     return LiveParts(
         style=Markup(_file("live.css")),
         heading=tag("h1", title_line(case).words),
-        task=_task(case, solution),
-        answer=_answer_markup(answer),
+        task=_task(case, solution) if track is None else _task_markup(track.task),
+        answer=_headline(nlp, x, answer, track, has_module=bool(module)),
         body=_body(case, data, drawing, fault),
         footer=_footer(source, module),
         data=script_json(page),
@@ -238,25 +248,65 @@ def _answer(solution: Solution) -> dict[str, Any]:
     own = solution.outcomes[0].own if combination is None else combination.combined
     x = solution.x if own is None else own.x
     result = result_of(solution)
-    words = headline(result, solution.case).words if isinstance(result, SolveResult) else _combined_words(solution)
-    return {"x": x.tolist(), "words": words, "isOptimum": solution.status.is_answer}
+    found: dict[str, Any] = {"x": x.tolist(), "isOptimum": solution.status.is_answer, "optima": [], "tasks": []}
+    if isinstance(result, SolveResult):
+        return {**found, "words": headline(result, solution.case).words}
+    value = "" if result.combined.value is None else f" = {number(result.combined.value)}"
+    units = [unit_of_objective(solution.case, k) for k in range(len(result.combined.tasks))]
+    return {
+        **found,
+        "words": f"{solution.case.method.value}{value}   ({solution.status.value})",
+        "optima": [each.best for each in result.combined.tasks],
+        "tasks": [_task_words(each, unit) for each, unit in zip(result.combined.tasks, units, strict=True)],
+    }
 
 
-def _combined_words(solution: Solution) -> str:
-    """Return F of each task, and the status of all."""
-    units = [unit_of_objective(solution.case, k) for k in range(len(solution.outcomes))]
-    named = zip(solution.outcomes, units, strict=True)
-    parts = [f"{each.task.name}: F = {number(each.F)} {unit}".rstrip() for each, unit in named]
-    return f"{'; '.join(parts)}   ({solution.status.value})"
+def _task_words(task: OutcomeData, unit: str) -> str:
+    """Return F of one of several tasks as a part of its separate optimum; ``panel.js`` writes it after a change."""
+    if task.F is None:
+        return f"{task.name}: no F"
+    words = f"{task.name}: F = {number(task.F)} {unit}".rstrip()
+    if task.best is None:
+        return words
+    part = f"{100 * task.F / task.best:.4g} % of " if task.best else ""
+    return f"{words}, {part}the separate {task.sense.value}imum {number(task.best)}"
 
 
-def _answer_markup(answer: dict[str, Any] | None) -> Markup:
-    """Return the content of the headline; the script fills it after a change."""
+def _headline(
+    nlp: Nlp, x: FloatArray, answer: dict[str, Any] | None, track: Track | None, *, has_module: bool
+) -> Markup:
+    """Return the headline of an answer, of a track or, without both and without a module, of the shown point."""
+    if answer is not None:
+        return _answer_markup(answer["words"], answer["tasks"])
+    if track is not None:
+        return _answer_markup(track.answer)
+    return _answer_markup("") if has_module else _value_markup(nlp, x)
+
+
+def _answer_markup(words: str, tasks: Sequence[str] = ()) -> Markup:
+    """Return the content of the headline, with words for each of several tasks; the script fills it after a change."""
     return join_markup(
         [
-            tag("span", "" if answer is None else answer["words"], id="F"),
+            tag("span", words, id="F"),
             tag("span", id="word"),
             tag("span", id="words"),
+            tag("ul", *(tag("li", each) for each in tasks), id="task-values", hidden=not tasks),
+        ]
+    )
+
+
+def _value_markup(nlp: Nlp, x: FloatArray) -> Markup:
+    """Return the headline of a page without an answer and without a module: the objective at the shown point."""
+    F = float(np.ravel(nlp.program.kernels.derivatives(x, nlp.arguments).F)[0])
+    words = f"{_name_of_F(nlp.case)} = {number(F)} {unit_of_objective(nlp.case)}".rstrip()
+    if len(nlp.case.tasks) > 1 or not math.isfinite(F):
+        words = ""
+    return join_markup(
+        [
+            tag("span", words, id="F"),
+            tag("span", "point", id="word"),
+            tag("span", "nothing is optimised", id="words"),
+            tag("ul", id="task-values", hidden=True),
         ]
     )
 
@@ -267,6 +317,11 @@ def _task(case: Case, solution: Solution | None) -> Markup:
     lines: list[Line] = []
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
         lines = [*task_lines(result.robot.task, case.units)]
+    return _task_markup(lines)
+
+
+def _task_markup(lines: Sequence[Line]) -> Markup:
+    """Return the place of the task in words."""
     return tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 
@@ -363,8 +418,12 @@ def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
         tag(
             "figcaption",
             tag("label", "Colour of limbs: ", tag("select", *options, id="colour")),
-            tag("span", class_="scale", aria_hidden="true"),
-            tag("span", "blue negative, orange positive"),
+            tag(
+                "span",
+                tag("span", class_="scale", aria_hidden="true"),
+                tag("span", "blue negative, orange positive"),
+                class_="together",
+            ),
             tag("label", "Shown: ", tag("select", *poses, id="pose")) if len(poses) > 1 else None,
             *_players(case),
             tag("button", "Reset view", type="button", id="view-reset"),

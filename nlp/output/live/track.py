@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
-from ....models import FloatArray, axis_angle_from_matrix
+from ....models import axis_angle_from_matrix
 from ...case.case import Case
-from ...case.pose import Free, Rotation
 from ...errors import CaseError, InputError
-from ...program.nlp import Nlp
-from ...program.places import FreeRotation
 from ...results.path import PathVerdictData
 from ...view.source import ViewSource, view_source
-from ..pictures.pathpanels import PathPicture
-from ..report.markup import NO_LIVE_VIEW, LiveView
+from ..pictures.pathpanels import PathPanel, PathPicture
+from ..report.markup import LiveView, no_live_view
 from ..report.path import path_page
 from ..report.pathview import PathView, path_view
 from .embed import embedded
 from .page import Track, live_parts
+from .posing import HALF_TURN, pose_places, with_free_pose
 
-#: Room around the path in its box of positions, as a fraction of the robot's size, and of the rotations, radians.
-_ROOM, _TURN = 0.05, 0.2
-#: Largest rotation, radians: the page's variables are smooth below half a turn.
-_HALF_TURN = math.pi - 0.01
+#: Room beyond the range of a coordinate in its bars, as a fraction of the range.
+_BAR_ROOM = 0.05
 
 
 def live_path_page(
@@ -41,57 +36,51 @@ def live_path_page(
         name: name of the case on the command line.
     """
     view = path_view(picture)
-    return path_page(picture, text, command, NO_LIVE_VIEW if view is None else _live_view(picture, view, name))
+    if view is None:
+        live = no_live_view("the joint coordinates are not known at any point of the path")
+    else:
+        live = _live_view(picture, view, name)
+    return path_page(picture, text, command, live)
 
 
 def _live_view(picture: PathPicture, view: PathView, name: str) -> LiveView:
-    """Return the live view along a path; without C for the case, no view."""
+    """Return the live view along a path; the reason without C for the case, or if dimensions change along the path."""
+    if moving := picture.judged.path.settings.names:
+        names = " and ".join(map(picture.judged.case.parameter_name, moving))
+        return no_live_view(f"it does not move {names} along a path")
     try:
         source = view_source(_case_along(picture, view))
         parts = live_parts(source, None, name, _track(picture, view, source))
-    except (CaseError, InputError):
-        return NO_LIVE_VIEW
+    except (CaseError, InputError) as error:
+        return no_live_view(str(error))
     return embedded(parts)
 
 
 def _case_along(picture: PathPicture, view: PathView) -> Case:
     """Return the case with the poses of the path as its range, at one pose, and without the path."""
-    case, poses = picture.judged.case, picture.samples.poses
-    room = _ROOM * view.data["size"]
-    position = [
-        Free(float(low) - room, float(high) + room)
-        for low, high in zip(poses.positions.min(axis=0), poses.positions.max(axis=0), strict=True)
-    ]
-    largest = max(axis_angle_from_matrix(each).angle for each in poses.rotations) + _TURN
-    if largest > _HALF_TURN:
-        raise InputError("the path turns the platform by half a turn or more")
-    rotation = Rotation(axis=None, angle=Free(-largest, largest))
-    return replace(
-        case,
-        position=position,
-        rotation=rotation,
-        displacements=case.displacements[:1],
-        further=(),
-        workspace=None,
-        path=None,
-        worst_everywhere=False,
-    )
+    poses = picture.samples.poses
+    largest = max(axis_angle_from_matrix(each).angle for each in poses.rotations)
+    if largest >= HALF_TURN:
+        raise InputError("the path turns the platform by half a turn")
+    return with_free_pose(picture.judged.case, poses.positions, largest, view.data["size"])
 
 
 def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
     """Return the postures of a view as variables of the live view's program."""
-    samples, nlp = picture.samples, source.subject.nlp
+    samples, nlp, path = picture.samples, source.subject.nlp, picture.judged.path
     joints = samples.joints
     if joints is None:
         raise InputError("the joint coordinates along the path are not known")
-    places = _places(nlp)
+    places = pose_places(nlp)
     inner = nlp.program.places.unknowns[0]
     frames = []
     x = nlp.start.copy()
     for number, (k, frame) in enumerate(zip(view.shown, view.data["frames"], strict=True)):
         axis, angle = axis_angle_from_matrix(samples.poses.rotations[k])
         values = [*samples.poses.positions[k], *(np.asarray(axis) * math.sin(angle / 2)), *joints.unknowns[k]]
-        frames.append({"words": frame["words"], "at": frame["at"], "values": [float(each) for each in values]})
+        has_time = bool(np.isfinite(path.durations[samples.points.segments[k]]))
+        numbers = [float(each) for each in values]
+        frames.append({"words": frame["words"], "at": frame["at"], "values": numbers, "has_time": has_time})
         if number == view.data["first"]:
             x[[*places, *inner]] = values
     shown = {key: view.data[key] for key in ("limits", "path", "nearest", "margins", "most", "marks", "first")}
@@ -100,7 +89,9 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
             "title": panel.title,
             "unit": panel.unit,
             "limits": list(panel.limits),
-            "most": _largest(panel.limits, [each.values for each in panel.curves]),
+            "is_speed": panel.is_speed,
+            "is_lower": panel.is_lower,
+            **_scale(panel),
             "curves": [
                 {
                     "name": f"{each.name} min" if each.is_other else each.name,
@@ -114,19 +105,20 @@ def _track(picture: PathPicture, view: PathView, source: ViewSource) -> Track:
     return Track(x, {**shown, "places": [*places, *inner], "frames": frames, "panels": panels})
 
 
-def _places(nlp: Nlp) -> list[int]:
-    """Return the indices in ``x`` of position and rotation: three coordinates, then the quaternion's vector part."""
-    numbers = dict(zip(nlp.case.scalars, nlp.program.places.numbers, strict=True))
-    (rotation,) = nlp.program.places.rotations
-    if not isinstance(rotation, FreeRotation):
-        raise InputError("the rotation of the platform has no variables")
-    return [*(numbers[f"p_{letter}"].index for letter in "xyz"), *rotation.q]
+def _scale(panel: PathPanel) -> dict[str, float]:
+    """Return the ends of the bars of a panel, and the value at which bars begin.
 
-
-def _largest(limits: tuple[float, ...], curves: list[FloatArray]) -> float:
-    """Return the largest magnitude of limits and values."""
-    every = np.abs(np.concatenate([np.array(limits), *curves]))
-    return float(np.max(every[np.isfinite(every)], initial=0.0)) or 1.0
+    Forces and speeds have a zero in the middle. The zero of a joint coordinate has no meaning for its limits: its bars
+    begin at the lower end of the range of limits and values.
+    """
+    every = np.concatenate([np.array(panel.limits), *(each.values for each in panel.curves)])
+    every = every[np.isfinite(every)]
+    if not panel.is_coordinate:
+        most = float(np.max(np.abs(every), initial=0.0)) or 1.0
+        return {"low": -most, "high": most, "base": 0.0}
+    low, high = float(np.min(every, initial=math.inf)), float(np.max(every, initial=-math.inf))
+    room = _BAR_ROOM * (high - low) or 1.0
+    return {"low": low - room, "high": high + room, "base": low - room}
 
 
 def _known(value: float) -> float | None:

@@ -55,7 +55,12 @@ def page_pictures(drawing: Drawing) -> tuple[bytes, bytes]:
 
     The narrow picture has no colour bar and no legend of lines.
     """
-    return picture_of(".svg", figure_of, [drawing], on_page=True), picture_of(".svg", _narrow_figure, drawing)
+    return picture_of(".svg", figure_of, [drawing], on_page=True), narrow_picture(drawing)
+
+
+def narrow_picture(drawing: Drawing) -> bytes:
+    """Return an SVG picture of a robot for a narrow page."""
+    return picture_of(".svg", _narrow_figure, drawing)
 
 
 def _narrow_figure(drawing: Drawing) -> Figure:

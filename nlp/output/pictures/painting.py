@@ -40,6 +40,8 @@ _ALONG_LINK = (0.45, 0.3, 0.6, 0.2, 0.72, 0.1, 0.84)
 _ALONG_ARROW = (0.5, 0.35, 0.7)
 #: Radius of the arc of an angle, as a fraction of its first ray.
 _ARC = 0.72
+#: Length of a velocity arrow, as a fraction of the longest one, below which its head would be longer than the arrow.
+_SHORTEST = 0.06
 #: Fraction below which a value is shown as 0: of the largest rate, of the robot's size for a pitch, and of the largest
 #: possible velocity of the motion.
 _NOISE = 1e-9
@@ -302,7 +304,7 @@ class Panel:
         factor = _ARROW * self.drawing.size / fastest
         for index, velocity in zip(self.drawing.corners, velocities, strict=True):
             at, name = self.drawing.posture.points[index], self.drawing.model.scene.points[index].name
-            if np.linalg.norm(velocity) > 1e-6 * fastest:
+            if np.linalg.norm(velocity) > _SHORTEST * fastest:
                 self._canvas.arrow(at, at + factor * velocity, f"velocity {name}", VELOCITY, 1.5, 48)
         handle = Line2D([], [], color=VELOCITY, linewidth=1.5, marker=">")
         words = f"velocity of the platform's corners, not to scale (fastest {fastest:.4g} {self._rate_unit()})"

@@ -20,8 +20,9 @@ from ...proof.workspace.judgement import Judgement
 from ...proof.workspace.path_samples import PathSamples, SampledNumber, motor_numbers
 from ...proof.workspace.verdict import Outcome
 from ...results.path import PathResult, PathVerdictData
+from ...results.pathtable import path_settings, settings_at
 from ...words.claims import CLAIM_WORDS
-from ...words.numbers import number
+from ...words.numbers import key_words, number
 from ...words.path import checked_claims
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ _LINES = 6
 #: Factors on the typical size and on the largest limit above which curves of forces and speeds have gaps: near singular
 #: poses they would hide all other values.
 _MOST, _BEYOND, _PAST = 95, 10.0, 3.0
+#: Dimensions of the rates of settings.
+_RATES = {Dimension.LENGTH: Dimension.SPEED, Dimension.ANGLE: Dimension.TURN_SPEED}
 #: Smallest drawn margin, percent.
 _LEAST_MARGIN = -100.0
 
@@ -69,6 +72,10 @@ class PathPanel(NamedTuple):
         curves: curves of the chart, at least one.
         limits: limits of the case, in this unit.
         is_cut: True if very large values are omitted.
+        is_coordinate: True for coordinates of actuators, False for their forces and speeds.
+        is_speed: True for speeds, which only segments with a time have.
+        is_lower: True if the only limit is a lower one.
+        is_setting: True if the only curve is a setting of the path, or its rate, instead of curves of actuators.
     """
 
     title: str
@@ -76,6 +83,10 @@ class PathPanel(NamedTuple):
     curves: tuple[PathCurve, ...]
     limits: tuple[float, ...]
     is_cut: bool = False
+    is_coordinate: bool = False
+    is_speed: bool = False
+    is_lower: bool = False
+    is_setting: bool = False
 
     @property
     def label(self) -> str:
@@ -149,9 +160,10 @@ class PathPicture:
         for k, key in ((k, self.samples.keys[k]) for k in shown):
             dimension = numbers[key].claim.reading.dimension
             value = number(units.shown(numbers[key].limit or 0.0, dimension))
+            words = key_words(f"limits.{key}")
             # A custom relation is a difference that is compared with 0.
             found.append(
-                (k, key if key.startswith("custom[") else f"{key} = {value} {units.label(dimension)}".rstrip())
+                (k, key if key.startswith("custom[") else f"{words} = {value} {units.label(dimension)}".rstrip())
             )
         return found
 
@@ -190,7 +202,12 @@ def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) ->
     """Return the content of the charts of a judged path."""
     way = progress_of(judged.path)
     units = {ProgressKind.TIME: ", s", ProgressKind.LENGTH: f", {judged.case.units.length}", ProgressKind.SEGMENTS: ""}
-    panels = (*_coordinates(judged, samples), *_speeds(judged, samples), *_forces(judged, samples))
+    panels = (
+        *_settings(judged, samples),
+        *_coordinates(judged, samples),
+        *_speeds(judged, samples),
+        *_forces(judged, samples),
+    )
     least = 100 * samples.least if len(samples.keys) else np.zeros(0)
     return PathPicture(
         judged,
@@ -206,6 +223,23 @@ def path_picture(judged: Judgement, samples: PathSamples, result: PathResult) ->
     )
 
 
+def _settings(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
+    """Yield a chart of each value that changes along the path and, with times, a chart of its rate."""
+    path, units = judged.path, judged.case.units
+    values, changes = settings_at(path, *samples.points)
+    rates = changes / path.durations[samples.points.segments, None]
+    for k, (name, dimension) in enumerate(path_settings(judged.case, path)):
+        if not np.ptp(values[:, k]):
+            continue
+        rate = _RATES.get(dimension, Dimension.NUMBER)
+        factor, speed = (units.shown(1.0, each) for each in (dimension, rate))
+        curve = PathCurve(name, k, factor * values[:, k])
+        yield PathPanel(name, units.label(dimension), (curve,), (), is_setting=True)
+        if path.is_timed:
+            curve = PathCurve(name, k, speed * rates[:, k])
+            yield PathPanel(f"rate of {name}", units.label(rate) or "1/s", (curve,), (), is_setting=True)
+
+
 def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
     """Yield charts of the actuator coordinates, one for each kind of actuator."""
     joints = samples.joints
@@ -218,9 +252,12 @@ def _coordinates(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]
         factor = judged.case.units.shown(1.0, dimension)
         curves = [PathCurve(drives[k].name, k, factor * joints.coordinates[:, k]) for k in own]
         names = {f"{measure} limb {drives[k].name}" for k in own}
-        limits = {each.limit for each in judged.extremes if each.name in names and each.limit is not None}
+        limited = [each for each in judged.extremes if each.name in names and each.limit is not None]
+        limits = {each.limit for each in limited if each.limit is not None}
+        is_lower = bool(limited) and all(each.sense is Sense.MIN for each in limited)
         words = {"leg_length": "leg lengths", "actuator_angle": "actuator angles"}.get(measure, "actuator lengths")
-        yield PathPanel(words, judged.case.units.label(dimension), tuple(curves), tuple(factor * x for x in limits))
+        ends, unit = tuple(sorted(factor * each for each in limits)), judged.case.units.label(dimension)
+        yield PathPanel(words, unit, tuple(curves), ends, is_coordinate=True, is_lower=is_lower)
 
 
 def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
@@ -235,7 +272,8 @@ def _speeds(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
             curves = tuple(PathCurve(each.name, k, factor * samples.speeds[:, k]) for k, each in own)
             ends = {factor * limited[each.name] for _, each in own if each.name in limited}
             limits = tuple(sign * end for end in ends for sign in (-1, 1))
-            yield _without_peaks(PathPanel("speeds along the path", units.label(dimension), curves, limits))
+            panel = PathPanel("speeds along the path", units.label(dimension), curves, limits, is_speed=True)
+            yield _without_peaks(panel)
     if not judged.path.is_timed:
         yield from _of_motors(judged, every, "largest speeds in the motions of the case")
 
@@ -317,7 +355,7 @@ def marks_text(marks: Sequence[PathMark]) -> str:
 
 def actuator_names(picture: PathPicture) -> dict[int, str]:
     """Return the names of the actuators with curves, by index."""
-    return {each.place: each.name for panel in picture.panels for each in panel.curves}
+    return {each.place: each.name for panel in picture.panels if not panel.is_setting for each in panel.curves}
 
 
 def percent(margin: float) -> str:

@@ -132,16 +132,24 @@ class Linkage:
         slopes = ca.jacobian(closure, own.unknowns)
         self._loops = Kernel(ca.Function("loops", own.all, [ca.densify(closure), ca.densify(slopes)]), tuple_of)
 
-    def posture_at(self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray) -> Posture:
+    def posture_at(
+        self, rotation: FloatArray, position: FloatArray, unknowns: FloatArray, parameters: FloatArray | None = None
+    ) -> Posture:
         """Return the drawing at a pose.
 
         Args:
             rotation: (3, 3) rotation ``R``.
             position: (3,) position ``p``, length.
             unknowns: values of the model's internal unknowns, which must close its loops.
+            parameters: components of all parameters, for dimensions that change; those of the robot if left out.
         """
         scene = self.model.scene
-        arguments = self._parameters, unknowns, rotation.ravel(order="F"), position
+        arguments = (
+            self._parameters if parameters is None else parameters,
+            unknowns,
+            rotation.ravel(order="F"),
+            position,
+        )
         columns, rows, works, relations, *quantities = self._drawing(*arguments)
         screws, quantities = quantities[: 3 * len(self._nested)], quantities[3 * len(self._nested) :]
         paths = paths_of(self._nested, screws)

@@ -26,7 +26,7 @@ from ...proof.workspace.slices.slices import Region, Slice
 from ...proof.workspace.verdict import Outcome
 from ...results.claims import PosedClaim
 from ...words.claims import claim_words
-from ...words.numbers import number
+from ...words.numbers import key_words, number
 from ...words.poses import pose_words
 from .canvas import INK, draw_edges
 from .drawing import Drawing, drawing_of
@@ -150,7 +150,7 @@ def slices_legend(case: Case, slices: Sequence[Slice]) -> list[Kind]:
 def slices_notes(slices: Sequence[Slice]) -> list[str]:
     """Return notes on limits that the slices do not show, and on the colour of boxes with several violated limits."""
     left_out = dict.fromkeys(key for each in slices for key in each.left_out)
-    notes = [f"not shown: {', '.join(left_out)}"] if left_out else []
+    notes = [f"not shown: {', '.join(key_words(f'limits.{each}') for each in left_out)}"] if left_out else []
     if len(slices[0].limits) > 1:
         notes.append(
             "if several limits are violated, the colour is that of the first one on the straight line from the centre"
@@ -182,7 +182,8 @@ def _kinds(case: Case, slices: Sequence[Slice]) -> list[Kind]:
     for k, limit in enumerate(limits):
         value = f"{number(case.units.shown(limit.limit, limit.dimension))} {case.units.label(limit.dimension)}".rstrip()
         how = "" if limit.is_enclosed else " at samples"
-        kinds.append(Kind(f"violated{how}: {limit.key} = {value}", colours[k]))
+        words = limit.key if limit.key.startswith("custom[") else key_words(f"limits.{limit.key}")
+        kinds.append(Kind(f"violated{how}: {words} = {value}", colours[k]))
     if limits:
         kinds.append(Kind("limits undecided", _PALE))
     return [

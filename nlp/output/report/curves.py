@@ -9,7 +9,7 @@ from ...words.designs import Column, ColumnKind, Designs, Row
 from ...words.numbers import key_words
 from ...words.objective import objective_label
 from .charts import Curve, Spot, line_chart
-from .markup import Markup, tag
+from .markup import Markup, caption, tag
 
 
 def curve_figures(*designs: Designs[Row], here: Mapping[str, float] | None = None) -> Markup:
@@ -41,12 +41,13 @@ def _chart(designs: Designs[Row], column: Column[Row], here: float | None) -> Ma
     over, unit = _over(designs), f" {_over(designs).unit}" if _over(designs).unit else ""
     values, F = _numbers(over, designs.rows), _numbers(column, designs.rows)
     varied = key_words(over.label)
-    name = f"{column.series}: " if len(designs.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
+    of = f" of {column.series}" if len(designs.of_kind(ColumnKind.OBJECTIVE)) > 1 else ""
+    name = f"F{of} over {varied}"
     solved = [(value, each) for value, each in zip(values, F, strict=True) if math.isfinite(each)]
-    words = f"{name}no optimum for any value of {varied} from {values[0]:.5g} to {values[-1]:.5g}{unit}."
+    words = f"no optimum for any value from {values[0]:.5g} to {values[-1]:.5g}{unit}."
     if solved:
         (first, F_first), (last, F_last) = solved[0], solved[-1]
-        words = f"{name}F is {F_first:.6g} at {varied} = {first:.5g}{unit} and {F_last:.6g} at {last:.5g}{unit}."
+        words = f"{F_first:.6g} at {first:.5g}{unit}, {F_last:.6g} at {last:.5g}{unit}."
         missing = len(values) - len(solved)
         if missing:
             words += f" No optimum at {missing} of {len(values)} values."
@@ -59,11 +60,11 @@ def _chart(designs: Designs[Row], column: Column[Row], here: float | None) -> Ma
             Spot(value, each, "spot" if value == here else "other", f"{value:.6g}{unit}: F = {each:.7g}")
             for value, each in solved
         ],
-        words=words,
+        words=f"{name}: {words}",
         labels=(over.axis, objective_label(designs.case)),
         bounds=middles,
     )
-    return tag("figure", chart, tag("figcaption", words))
+    return tag("figure", chart, caption(name, words))
 
 
 def _bend_values(designs: Designs[Row]) -> list[float]:

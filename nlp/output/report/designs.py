@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import EvaluationError
 from ...words.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
+from ...words.numbers import key_words
 from ..pictures.designs import design_pictures, legend_of, page_figure
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.figures import picture_of
@@ -17,6 +18,7 @@ from .curves import curve_figures
 from .markup import (
     Markup,
     answer_box,
+    caption,
     contents_and_body,
     image_source,
     join_markup,
@@ -31,8 +33,7 @@ from .tables import html_table
 #: Largest number of drawn designs, and of table rows on a page: a browser is slow with many more.
 _MOST, _ROWS = 12, 500
 _WORDS = (
-    "The robot at each design, with the same view and scale. Colours of limbs: blue for shortening, orange for "
-    "lengthening."
+    "Robot at each design, with the same view and scale. Colours of limbs: blue for shortening, orange for lengthening."
 )
 
 
@@ -47,7 +48,7 @@ def designs_page(designs: Designs[Row]) -> str:
     return whole_page(
         f"{designs.title} - {designs.word}",
         page.subtitle,
-        answer_box([page.answer], is_answer=page.is_answer),
+        answer_box([key_words(page.answer)], is_answer=page.is_answer),
         body,
         heading=designs.title,
         contents=contents,
@@ -61,7 +62,10 @@ def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     if page.is_answer and (legend := legend_of(table)):
         aside = tag("ul", *(tag("li", line) for line in legend), class_="plain", tabindex="0")
     beside = tag("div", tag("div", _picture(table), class_="wide"), aside, class_="beside")
-    yield (*page.picture, join_markup([paragraphs(page.rules), beside, paragraphs(page.cautions)]))
+    yield (
+        *page.picture,
+        join_markup([paragraphs(map(key_words, page.rules)), beside, paragraphs(map(key_words, page.cautions))]),
+    )
     yield "designs", page.designs, design_figures(designs)
     yield (*page.table, designs_rows(table))
 
@@ -77,25 +81,30 @@ def _picture(designs: Designs[Row]) -> Markup:
         wide, narrow = (picture_of(".svg", page_figure, designs, is_narrow=each) for each in (False, True))
     except EvaluationError as error:
         return paragraphs([f"{error}."])
-    return picture_figure(wide, narrow, page.below)
+    return picture_figure(wide, narrow, page.picture[1], page.below)
 
 
 def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     """Yield anchor, heading and content of the sections of a page about several robots."""
     page = designs.page
-    yield (*page.table, join_markup([paragraphs(page.rules), designs_rows(designs)]))
+    yield (*page.table, join_markup([paragraphs(map(key_words, page.rules)), designs_rows(designs)]))
     with suppress(EvaluationError):  # if no robot has an optimum
         *robots, wide, narrow = robot_pictures(designs)
         alt = "Robot at its design; the values are in the table."
         images = [tag("img", src=image_source(each), alt=alt) for each in robots]
         legend = picture_element(wide, narrow, alt="Colour scale of the limb rates.")
         shown = [tag("div", *images, class_="designs robots"), legend]
-        yield (*page.picture, tag("figure", *shown, tag("figcaption", page.below)))
+        yield (*page.picture, tag("figure", *shown, caption("Robots", page.below)))
     details = []
     for each in designs.details:
-        details += [tag("h3", each.name), paragraphs(each.sentences)]
-        details += [] if each.table is None else [html_table(each.table, f"dimensions of {each.name}")]
+        details += [tag("h3", each.name), paragraphs(map(_in_words, each.sentences))]
+        details += [] if each.table is None else [html_table(each.table, f"Dimensions: {each.name}")]
     yield "details", "Robots in detail", join_markup(details)
+
+
+def _in_words(sentence: str) -> str:
+    """Return a sentence with limits in words; one with an option of a command keeps the keys."""
+    return sentence if "--" in sentence else key_words(sentence)
 
 
 def designs_rows(designs: Designs[Row]) -> Markup:
@@ -103,9 +112,9 @@ def designs_rows(designs: Designs[Row]) -> Markup:
     few = (
         "" if len(designs.rows) <= _ROWS else f"The first {_ROWS} of {len(designs.rows):,} rows; CSV and JSON have all."
     )
-    below = tag("p", f"Active in all rows: {designs.throughout}.") if designs.throughout else None
+    below = tag("p", f"Active in all rows: {key_words(designs.throughout)}.") if designs.throughout else None
     rows = html_table(designs_table(designs, _ROWS), designs.caption, id="swept" if designs.join is Join.GRID else None)
-    return join_markup([tag("p", few) if few else None, rows, below])
+    return tag("div", tag("p", few) if few else None, rows, below)
 
 
 def bends(active: Sequence[frozenset[str]]) -> list[int]:
@@ -136,7 +145,7 @@ def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
     found = bends([frozenset(each.active) for each in designs])
     lines = [
         f"Between {designs[k - 1].name} and {designs[k].name}: "
-        f"{changed_words(designs[k - 1].active, designs[k].active)}."
+        f"{key_words(changed_words(designs[k - 1].active, designs[k].active))}."
         for k in found
     ]
     if not lines:

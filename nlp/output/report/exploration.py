@@ -22,7 +22,7 @@ from ...words.tradeoff import tradeoff_designs
 from .charts import Curve, Spot, count_chart, line_chart
 from .curves import curve_figures
 from .designs import designs_rows
-from .markup import Markup, join_markup, paragraphs, script_frame, tag
+from .markup import Markup, beside, caption, join_markup, paragraphs, script_frame, tag
 from .report import Part, Report
 from .slices import Slice, has_loops
 from .tables import html_table
@@ -72,6 +72,7 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, u
     F = f"{number(task_F(robot, best.F))} {unit}".rstrip()
     times = "once" if best.count == 1 else f"{best.count} times"
     words = f"{len(solution.optima)} distinct optima; the best, F = {F}, was reached {times}."
+    shown = []
     if len(solution.optima) == 1:
         words = f"All of them reached the same optimum, F = {F}."
         if best.count == 1:
@@ -79,10 +80,11 @@ def _optima_of(solution: ProgramSolution, robot: RobotData | None, label: str, u
         yield tag("p", words)
     else:
         chart = count_chart([(o.F, o.count) for o in solution.optima], words=words, labels=(label, "starts"))
-        yield tag("figure", chart, tag("figcaption", words))
+        name = "Local optima"
+        shown = [tag("figure", chart, caption(name, f"number of starts over F. {words}"), class_="chart-figure")]
     left = len(solution.optima) - MOST_OPTIMA
     more = f" ({left} worse {'optimum' if left == 1 else 'optima'} not shown)" if left > 0 else ""
-    yield html_table(optimum_table(solution, robot), f"Variables at the local optima{more}")
+    yield beside(*shown, html_table(optimum_table(solution, robot), f"Local optima: F and variables{more}"))
 
 
 def surroundings(report: Report) -> Markup:
@@ -98,7 +100,7 @@ def surroundings(report: Report) -> Markup:
     if report.curves:
         here = {f"limits.{row.key}": row.limit for row in _limits(report)}
         curves = [tradeoff_designs(each, report.case) for each in report.curves]
-        parts += [tag("p", _ENCLOSED), curve_figures(*curves, here=here), *map(designs_rows, curves)]
+        parts += [tag("p", _ENCLOSED), curve_figures(*curves, here=here), beside(*map(designs_rows, curves))]
     parts += _slices(report)
     if with_maps:
         parts.append(tag("h3", "F over two variables"))
@@ -146,7 +148,7 @@ def _slice(part: Part, each: Slice) -> Markup:
     finite = np.isfinite(each.F)
     if finite.any():
         kept = np.isfinite(inside)
-        words = f"{variable.name}: F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} along the slice"
+        words = f"F from {np.nanmin(each.F):.5g} to {np.nanmax(each.F):.5g} along the slice"
         if kept.any():
             k = int(np.nanargmax(inside) if nlp.sign < 0 else np.nanargmin(inside))
             best = "largest" if nlp.sign < 0 else "smallest"
@@ -159,7 +161,7 @@ def _slice(part: Part, each: Slice) -> Markup:
             words += "; no point satisfies all limits"
         words += f". This design: F = {here:.6g} {part.unit}".rstrip() + f" at {at:.5g} {unit}".rstrip() + "."
     else:
-        words = f"{variable.name}: no slice, as this variable cannot change while all others are fixed."
+        words = "no slice, as this variable cannot change while all others are fixed."
     chart = line_chart(
         [Curve(values, each.F.tolist(), "curve outside"), Curve(values, inside.tolist(), "curve")],
         [
@@ -167,11 +169,11 @@ def _slice(part: Part, each: Slice) -> Markup:
                 at, here, "spot", f"this design: {variable.name} = {at:.6g} {unit}, F = {here:.7g} {part.unit}".rstrip()
             )
         ],
-        words=words,
+        words=f"{variable.name}: {words}",
         labels=(f"{variable.name}, {unit}" if unit else variable.name, part.label),
         bounds=(values[0], values[-1]),
     )
-    return tag("figure", chart, tag("figcaption", words))
+    return tag("figure", chart, tag("figcaption", tag("b", f"{variable.name}:"), " ", words))
 
 
 def _maps(report: Report, parts: Sequence[int]) -> Markup:

@@ -17,6 +17,7 @@ from ..pictures.loads import DrawnForces
 from ..pictures.posture import Posture
 from ..pictures.style import BESIDE, FORCE_COLOURS, RATE_COLOURS, signed_text
 from ..pictures.view import View, clearest_view
+from .markup import with_signs
 
 
 class LinkData(TypedDict):
@@ -278,7 +279,9 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "name": "" if motion is None else motion.name,
         "task": shown.task,
         "pose": shown.pose,
-        "pose_words": f"pose {shown.pose + 1} of {shown.poses}, F = {shown.words or f'{F:.7g} {unit_of_F}'}".rstrip(),
+        "pose_words": with_signs(
+            f"pose {shown.pose + 1} of {shown.poses}, F = {shown.words or f'{F:.7g} {unit_of_F}'}".rstrip()
+        ),
         "is_worst": shown.is_worst,
         "headline": drawing.headline,
         "is_answer": drawing.is_answer,
@@ -298,7 +301,7 @@ def view_data(drawing: Drawing, rates: FloatArray, shown: PoseView = PoseView())
         "motion": None if motion is None else _motion_data(motion, units),
         "free": [_motion_data(each, units) for each in drawing.free],
         "forces": _force_data(drawing, drawing.forces),
-        "forces_words": _forces_words(drawing.forces),
+        "forces_words": with_signs(_forces_words(drawing.forces)),
         "reference": None if drawing.reference is None else drawing.reference.points.tolist(),
         "colours": list(RATE_COLOURS),
         "eye": first_eye(drawing),
@@ -330,7 +333,13 @@ def _force_data(drawing: Drawing, forces: DrawnForces | None) -> list[ForceData]
             ends = ends + BESIDE * drawing.size * out / (float(np.linalg.norm(out)) or 1.0)
         colour = FORCE_COLOURS[arrow.kind]
         found.append(
-            {"kind": arrow.kind, "name": arrow.name, "words": arrow.words, "colour": colour, "ends": ends.tolist()}
+            {
+                "kind": arrow.kind,
+                "name": arrow.name,
+                "words": with_signs(arrow.words),
+                "colour": colour,
+                "ends": ends.tolist(),
+            }
         )
     return found
 

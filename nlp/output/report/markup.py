@@ -15,6 +15,7 @@ from importlib.resources import files
 from string import Template
 from typing import Any, NamedTuple
 
+from ...words.numbers import key_words
 from ...words.text import Line
 
 
@@ -35,9 +36,28 @@ class LiveView(NamedTuple):
     markup: Markup
     is_live: bool
 
+    def shown(self, still: Markup) -> Markup:
+        """Return the elements for a page, which has a picture and a table until the script has started.
+
+        Args:
+            still: picture and table; an element with a shadow tree does not show its content, so no script hides it.
+        """
+        if not self.is_live:
+            return self.markup
+        words = "The sliders need JavaScript; this picture and the tables below are complete without it."
+        note = tag("noscript", tag("p", words, class_="note"))
+        return join_markup([tag("div", still, note, id="live"), self.markup])
+
 
 #: Page without a live view.
 NO_LIVE_VIEW = LiveView(Markup(""), is_live=False)
+
+
+def no_live_view(reason: str) -> LiveView:
+    """Return the sentence in the place of a live view."""
+    return LiveView(tag("p", f"This page has no sliders: {reason}.", class_="note"), is_live=False)
+
+
 #: Elements without an end tag.
 _VOID = frozenset(["meta", "link", "input", "br", "img", "source"])
 #: Elements whose text is copied into a shell or a file, character by character.
@@ -46,6 +66,8 @@ _EXACT = frozenset(["code", "title"])
 _READ = frozenset(["aria_label", "aria_valuetext", "alt"])
 #: Hyphen that is the sign of a number or of an exponent, not part of a name such as limb 1- or 6-PUS.
 _SIGN = re.compile(r"(?<![\w.)\]\"'-])-(?=\.?\d)|(?<=\de)-(?=\d)")
+#: Signs of inequalities as a case file has them, and as a page has them.
+_RELATIONS = {"<=": "\N{LESS-THAN OR EQUAL TO}", ">=": "\N{GREATER-THAN OR EQUAL TO}"}
 
 
 def tag(name: str, *content: object, **attributes: object) -> Markup:
@@ -62,7 +84,7 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
         if value is None or value is False:
             continue
         label = key.rstrip("_").replace("_", "-")
-        text = with_minus(str(value)) if key in _READ else str(value)
+        text = with_signs(str(value)) if key in _READ else str(value)
         parts.append(label if value is True else f'{label}="{escape(text)}"')
     opening = f"<{' '.join(parts)}>"
     if name in _VOID:
@@ -70,15 +92,17 @@ def tag(name: str, *content: object, **attributes: object) -> Markup:
     return Markup(f"{opening}{_exact_markup(content) if name in _EXACT else join_markup(content)}</{name}>")
 
 
-def with_minus(text: str) -> str:
-    """Return a text with the minus sign, U+2212, at its negative numbers."""
+def with_signs(text: str) -> str:
+    """Return a text with the minus sign, U+2212, at its negative numbers, and with the signs of its inequalities."""
+    for written, sign in _RELATIONS.items():
+        text = text.replace(written, sign)
     return _SIGN.sub("\N{MINUS SIGN}", text)
 
 
 def join_markup(content: Iterable[object]) -> Markup:
-    """Return several pieces of content as one piece; text is escaped, and its negative numbers get a minus sign."""
+    """Return several pieces of content as one piece; text is escaped and gets the signs of :func:`with_signs`."""
     return _exact_markup(
-        part if part is None or isinstance(part, Markup) else with_minus(str(part)) for part in content
+        part if part is None or isinstance(part, Markup) else with_signs(str(part)) for part in content
     )
 
 
@@ -201,7 +225,7 @@ def contents_and_body(sections: Iterable[tuple[str, str, Markup]]) -> tuple[Mark
     Args:
         sections: anchor, heading and content of each section.
     """
-    found = [each for each in sections if each[2]]
+    found = [(anchor, key_words(heading), content) for anchor, heading, content in sections if content]
     contents = tag("ul", *(tag("li", tag("a", heading, href=f"#{anchor}")) for anchor, heading, _ in found))
     body = join_markup(
         tag(
@@ -216,15 +240,27 @@ def contents_and_body(sections: Iterable[tuple[str, str, Markup]]) -> tuple[Mark
     return contents, body
 
 
-def picture_figure(svg: bytes, narrow: bytes, words: str) -> Markup:
+def picture_figure(svg: bytes, narrow: bytes, name: str, words: str) -> Markup:
     """Return a picture as a figure of a page.
 
     Args:
         svg: content of the SVG file.
         narrow: content of the SVG file for a narrow window.
-        words: caption and text alternative of the picture.
+        name: name of the picture.
+        words: content of the picture.
     """
-    return tag("figure", picture_element(svg, narrow, alt=words), tag("figcaption", words))
+    return tag("figure", picture_element(svg, narrow, alt=f"{name}: {words}"), caption(name, words))
+
+
+def caption(name: str, *words: object, **attributes: object) -> Markup:
+    """Return the caption of a figure: its name, then its content and notes, as in the captions of tables."""
+    head = key_words(name)
+    return tag("figcaption", tag("b", f"{head[:1].upper()}{head[1:]}:"), " ", *words, **attributes)
+
+
+def beside(*parts: Markup) -> Markup:
+    """Return figures and tables side by side where the window is wide enough for them, else below each other."""
+    return tag("div", *parts, class_="row")
 
 
 def picture_element(svg: bytes, narrow: bytes, **attributes: object) -> Markup:

@@ -11,6 +11,7 @@ from ...results.path import PathVerdictData
 from ...system.jsonvalues import json_data
 from ...words.path import checked_claims, fault_words, first_refuted, path_summary, verdict_words
 from ...words.poses import pose_words
+from ..pictures.figures import narrow_picture
 from ..pictures.figures import picture as picture_file
 from ..pictures.pathpanels import (
     ACTUATOR_COLOURS,
@@ -27,6 +28,8 @@ from .markup import (
     LiveView,
     Markup,
     answer_box,
+    beside,
+    caption,
     contents_and_body,
     image_source,
     join_markup,
@@ -38,12 +41,10 @@ from .markup import (
     whole_page,
 )
 from .pathview import MOST_MARGIN, PathView, path_view, thinned
-from .verdicts import origin, refuting_place, shown_verdicts
+from .verdicts import dimensions_table, origin, refuting_place, shown_verdicts
 
 #: Largest number of points of a curve.
 _POINTS = 600
-#: Colour of limits, and of the path where a limit is violated.
-_RED = "#a3250f"
 
 
 def path_page(
@@ -60,13 +61,16 @@ def path_page(
     case, result = picture.judged.case, picture.result
     title = case.title or case.name
     view = path_view(picture)
-    sections = [
+    verdicts = [
         ("verdicts", "Verdicts along the path", _verdicts(picture)),
         ("refuted", "Violated limits and singularities", _refuted(picture, command)),
-        # One section, in which the slider stays visible.
-        ("robot", "Robot along the path", join_markup([_robot(picture, view, is_live=live.is_live), _curves(picture)])),
-        ("origin", "Case file and versions", origin(result.versions, text)),
     ]
+    # One section, in which the slider stays visible.
+    shown = join_markup([_robot(picture, view, is_live=live.is_live), _curves(picture)])
+    robot = [("robot", "Robot along the path", shown)]
+    # Without a live view, the robot comes first.
+    sections = [*verdicts, *robot] if live.is_live else [*robot, *verdicts]
+    sections.append(("origin", "Case file and versions", origin(result.versions, text)))
     contents, body = contents_and_body(sections)
     words = verdict_words(result)
     answers = [f"{words[0].upper()}{words[1:]}."]
@@ -75,7 +79,7 @@ def path_page(
         answers.append(f"First violation: {fault_words(first, first.fault)}.")
     return whole_page(
         f"{title} - {picture.judged.path.source}",
-        f"{case.name}, robot {case.model.name}, along {picture.judged.path.source}",
+        f"Tool path: {case.name}, robot {case.model.name}, along {picture.judged.path.source}",
         answer_box(answers, is_answer=result.proved),
         body,
         heading=title,
@@ -84,8 +88,19 @@ def path_page(
         scripts=() if view is None or live.is_live else ("tools.js", "joints.js", "robot.js", "path.js"),
         data={"result": json_data(result), "view": None if view is None or live.is_live else view.data},
         plotly="" if view is None or live.is_live else packed_plotly(),
-        live=live.markup if view is None or not live.is_live else join_markup([_controls(view), live.markup]),
+        live=_first_screen(picture, view, live),
     )
+
+
+def _first_screen(picture: PathPicture, view: PathView | None, live: LiveView) -> Markup:
+    """Return the live view with its slider, and the robot with its dimensions until the script has started."""
+    if view is None or not live.is_live:
+        return live.markup
+    words = view.data["frames"][view.data["first"]]["words"]
+    image = tag("img", src=image_source(narrow_picture(view.drawing)), alt=f"Robot: {words}", class_="design")
+    figure = tag("figure", image, caption("Robot", f"{words}."))
+    table = dimensions_table(picture.judged.case)
+    return join_markup([_controls(view), live.shown(beside(figure, table))])
 
 
 def _verdicts(picture: PathPicture) -> Markup:
@@ -126,26 +141,31 @@ def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Mar
     still = image_source(picture_file([view.drawing], ".svg"))
     if is_live:
         image = tag("img", src=still, alt=f"Robot, {words}.", class_="design printed")
-        return join_markup([*coloured, tag("figure", image, tag("figcaption", _legend(picture, data["marks"] != [])))])
+        return join_markup([*coloured, tag("figure", image, _legend(picture, data["marks"] != []))])
     flat = "No WebGL in this browser: the drawing of the robot is fixed, but the curves follow the slider."
     figure = tag(
         "figure",
-        script_frame("view", "picture", "3-D view of the robot and of the path of its platform's origin."),
         tag("p", flat, class_="flat-words", role="status"),
-        tag("img", src=still, alt=f"Robot, {words}.", class_="still chosen"),
+        tag(
+            "div",
+            script_frame("view", "picture", "3-D view of the robot and of the path of its platform's origin."),
+            tag("img", src=still, alt=f"Robot, {words}.", class_="still chosen"),
+            class_="stage",
+        ),
         view_buttons(),
         tag("img", id="view-copy", class_="copy", alt="3-D view of the robot"),
-        tag("figcaption", _legend(picture, data["marks"] != []), id="view-words"),
+        _legend(picture, data["marks"] != [], id="view-words"),
     )
     note = "The view needs JavaScript; all curves and tables are complete without it."
-    return join_markup([_controls(view), *coloured, figure, tag("noscript", tag("p", note))])
+    shown = beside(figure, dimensions_table(picture.judged.case))
+    return join_markup([_controls(view), *coloured, shown, tag("noscript", tag("p", note))])
 
 
-def _legend(picture: PathPicture, has_marks: bool) -> Markup:
-    """Return the legend of the colours of the path."""
-    entries = [tag("li", _swatch(LIMIT_COLOURS[k % len(LIMIT_COLOURS)]), words) for k, words in picture.limits]
+def _legend(picture: PathPicture, has_marks: bool, **attributes: object) -> Markup:
+    """Return the caption of the view, with the colours of the path; the attributes are those of the element."""
+    entries = [tag("li", _swatch(f"l{k % len(LIMIT_COLOURS)}"), words) for k, words in picture.limits]
     if (picture.margins < 0).any():
-        entries.append(tag("li", _swatch(_RED), "limit violated"))
+        entries.append(tag("li", _swatch("limit"), "limit violated"))
     parts = []
     if entries:
         parts.append(tag("p", "Path of the platform's origin, coloured by the nearest limit:", class_="by-limit"))
@@ -157,20 +177,20 @@ def _legend(picture: PathPicture, has_marks: bool) -> Markup:
         )
     words = "Red diamonds: first violation of each limit or rank." if has_marks else ""
     dark = " Dark joints are actuated." if picture.judged.case.model.scene.joints else ""
-    return join_markup([*parts, tag("p", f"{words}{dark}".strip())])
+    parts.append(tag("p", f"{words}{dark}".strip()))
+    return caption("Robot along the path", *parts, **attributes)
 
 
 def _curves(picture: PathPicture) -> Markup:
     """Return charts of all quantities along the path, with a cursor at the shown posture."""
     names = actuator_names(picture)
     entries = [
-        tag("li", _swatch(ACTUATOR_COLOURS[place % len(ACTUATOR_COLOURS)]), f"actuator {name}")
-        for place, name in names.items()
+        tag("li", _swatch(f"a{place % len(ACTUATOR_COLOURS)}"), f"actuator {name}") for place, name in names.items()
     ]
     if any(each.is_other for panel in picture.panels for each in panel.curves):
         entries.append(tag("li", "dashed: smaller of two values"))
     if any(panel.limits for panel in picture.panels) or picture.margins.size:
-        entries.append(tag("li", _swatch(_RED), "limit"))
+        entries.append(tag("li", _swatch("limit"), "limit"))
     if picture.marks:
         entries.append(tag("li", f"dotted: first violations, {marks_text(picture.marks)}"))
     shown = thinned(picture, _POINTS, np.arange(len(picture.at)))
@@ -192,13 +212,14 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     at = picture.at[shown].tolist()
     count = len(ACTUATOR_COLOURS)
     names, strips = actuator_names(picture), dict[int, list[Curve]]()
+    names = {each.place: "" for each in panel.curves} if panel.is_setting else names
     for each in panel.curves:
         kind = f"curve a{each.place % count}{' other' * each.is_other}"
         strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
-    ends = f" from {every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else ": no known value"
-    named = [Strip(f"actuator {names[place]}", curves) for place, curves in strips.items()]
-    return _chart(picture, named, f"{panel.title}{ends}", panel.unit, panel.limits)
+    ends = f"{every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else "no known value"
+    named = [Strip(f"actuator {names[place]}".strip(), curves) for place, curves in strips.items()]
+    return _chart(picture, named, (panel.title, ends), panel.unit, panel.limits)
 
 
 def _margins(picture: PathPicture, shown: list[int]) -> Markup:
@@ -209,19 +230,30 @@ def _margins(picture: PathPicture, shown: list[int]) -> Markup:
         for k, _ in picture.limits
     ]
     known = picture.margins[np.isfinite(picture.margins)]
-    words = f"smallest margin of all limits, at least {known.min():.3g} %" if known.size else "no known margin"
+    words = f"at least {known.min():.3g} %" if known.size else "no known margin"
     return _chart(
         picture,
         [Strip("", curves or [Curve(at, picture.drawn_margins[shown].tolist(), "curve")])],
-        words,
+        ("smallest margin of all limits", words),
         "margin, %",
         (0.0,),
     )
 
 
-def _chart(picture: PathPicture, strips: list[Strip], words: str, label: str, limits: tuple[float, ...]) -> Markup:
-    """Return a chart over the position along the path, with violations and segments that are not proved."""
-    words = f"{words[0].upper()}{words[1:]}."
+def _chart(
+    picture: PathPicture, strips: list[Strip], named: tuple[str, str], label: str, limits: tuple[float, ...]
+) -> Markup:
+    """Return a chart over the position along the path, with violations and segments that are not proved.
+
+    Args:
+        picture: path with its verdicts and curves.
+        strips: strips of the chart, at least one.
+        named: name and content of the chart, for its caption.
+        label: label of the vertical axis.
+        limits: limits of the case, in the unit of the chart.
+    """
+    name, content = named
+    words = f"{name[0].upper()}{name[1:]}: {content}."
     labels, bounds = (picture.label, label), [each.at for each in picture.marks]
     bands = [Band(each.start, each.end, "refuted" if each.is_refuted else "open") for each in picture.bands]
     ends = (float(picture.way.knots[0]), float(picture.way.knots[-1]))
@@ -240,12 +272,12 @@ def _chart(picture: PathPicture, strips: list[Strip], words: str, label: str, li
         )
     else:
         chart = strip_chart(strips, words=words, labels=labels, bounds=bounds, levels=limits, bands=bands, ends=ends)
-    return tag("figure", tag("figcaption", words), chart)
+    return tag("figure", caption(name, f"{content}."), chart)
 
 
-def _swatch(colour: str) -> Markup:
-    """Return a colour sample for a legend."""
-    return tag("span", class_="swatch", style=f"--fill: {colour}")
+def _swatch(kind: str) -> Markup:
+    """Return a colour sample for a legend, of the colour that charts of the page have for a kind of curve."""
+    return tag("span", class_=f"swatch {kind}")
 
 
 def _refuted(picture: PathPicture, command: Callable[[PathVerdictData], str]) -> Markup:

@@ -14,6 +14,7 @@ from ..pictures.drawing import Drawing, drawing_without_task
 from ..pictures.pathpanels import LIMIT_COLOURS, PathPicture, percent
 from ..pictures.posture import Linkage, Posture
 from .frames import JointData, LinkData, PointData, first_eye, joint_data, link_data
+from .markup import with_signs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,10 +88,18 @@ def path_view(picture: PathPicture) -> PathView | None:
     scene = model.scene
     numbers = 3 * (len(scene.points) + sum(1 + len(each.axes) for each in scene.joints))
     shown = thinned(picture, min(_POSTURES, _NUMBERS // numbers), np.flatnonzero(joints.closed))
-    linkage = Linkage(model, case.fixed_parameters("postures have fixed dimensions"), case.characteristic_length)
-    postures = [
-        linkage.posture_at(samples.poses.rotations[k], samples.poses.positions[k], joints.unknowns[k]) for k in shown
-    ]
+    settings = judged.path.settings
+    numbers_at = case.fixed_parameters("postures have fixed dimensions", settings.names)
+    linkage = Linkage(model, numbers_at, case.characteristic_length)
+    moving = [[name for item in model.parameters for name in item.components].index(name) for name in settings.names]
+    postures = []
+    for k, values in zip(
+        shown, settings.at(samples.points.segments[shown], samples.points.parameters[shown]), strict=True
+    ):
+        numbers_at = numbers_at.copy()
+        numbers_at[moving] = values
+        pose = samples.poses.rotations[k], samples.poses.positions[k]
+        postures.append(linkage.posture_at(*pose, joints.unknowns[k], numbers_at))
     first = _first(picture, shown)
     drawing = drawing_without_task(case, model, linkage, postures[first])
     size, way = drawing.size, thinned(picture, _POINTS, np.arange(len(picture.at)))
@@ -174,7 +183,7 @@ def _frame(picture: PathPicture, k: int, posture: Posture, size: float) -> PathF
             f": {nearest} violated by {percent(-margin)}" if margin < 0 else f": margin {percent(margin)} to {nearest}"
         )
     return {
-        "words": words,
+        "words": with_signs(words),
         "at": float(picture.at[k]),
         "position": _rounded(posture.position, size),
         "points": _rounded(posture.points, size),

@@ -31,6 +31,7 @@ from ..pictures.figures import picture_of
 from ..pictures.posture import states_at_poses, worst_pose
 from ..pictures.schedules import figure_of_schedule
 from .frames import PoseView, ViewData, view_data
+from .markup import with_signs
 from .slices import Plane, Slice, has_loops, planes_of, slices_of
 
 #: Largest number of maps of two variables in a report: seven variables have 21 pairs.
@@ -202,7 +203,7 @@ def _plane(part: Part, plane: Plane) -> dict[str, Any]:
         "F": [[float(f"{value:.5g}") if np.isfinite(value) else None for value in row] for row in plane.F],
         "inside": ["".join("1" if kept else "0" for kept in row) for row in plane.inside],
         "at": [shown(i, float(x[i])), shown(j, float(x[j]))],
-        "words": plane_words(nlp, x, plane),
+        "words": with_signs(plane_words(nlp, x, plane)),
     }
 
 

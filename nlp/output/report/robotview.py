@@ -5,11 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from ..pictures.figures import picture
+from ..pictures.drawing import Drawing
+from ..pictures.figures import narrow_picture, page_pictures
 from ..pictures.style import RATE_COLOURS
 from .frames import ViewData
-from .markup import Markup, image_source, join_markup, paragraphs, script_frame, tag, view_buttons
+from .markup import (
+    Markup,
+    beside,
+    caption,
+    image_source,
+    join_markup,
+    paragraphs,
+    picture_element,
+    script_frame,
+    tag,
+    view_buttons,
+)
 from .report import Report
+from .tables import aligned
 
 #: Largest number of drawings in a page; further views have only their tables.
 _DRAWINGS = 12
@@ -49,12 +62,27 @@ def drawings(report: Report) -> Markup:
     ]
     stills = []
     for index, view, drawing in found[:_DRAWINGS]:
-        source = image_source(_with_fewer_digits(picture([drawing], ".svg")))
-        words = f"Robot, {view['pose_words']}; values are in the table below."
+        words = f"Robot, {view['pose_words']}; values are in the table."
         kind = "still" if index else "still chosen"
-        stills.append(tag("img", src=source, alt=words, class_=kind, data_view=index))
-    words = "No WebGL in this browser: the drawing of the robot is fixed, but the table follows the sliders."
-    return join_markup([tag("p", words, class_="flat-words", role="status"), *stills])
+        stills.append(_still(drawing, alt=words, class_=kind, data_view=index))
+    return join_markup(stills)
+
+
+def _still(drawing: Drawing, **attributes: object) -> Markup:
+    """Return a drawing as a picture for wide and narrow windows; the attributes are those of the image."""
+    wide, narrow = map(_with_fewer_digits, page_pictures(drawing))
+    return picture_element(wide, narrow, **attributes)
+
+
+def first_still(report: Report) -> Markup:
+    """Return the first drawing with labels that a telephone shows large enough; empty without a drawing."""
+    drawing = next((drawing for part in report.parts for drawing in part.drawings), None)
+    if drawing is None:
+        return Markup("")
+    source = image_source(_with_fewer_digits(narrow_picture(drawing)))
+    words = "the design, at its first pose" if report.case.poses_per_task > 1 else "the design"
+    image = tag("img", src=source, alt=f"Robot: {words}", class_="design")
+    return tag("figure", image, caption("Robot", words, "; limbs with their rates." if drawing.rows else "."))
 
 
 def robot_section(report: Report, *, is_live: bool = False) -> Markup:
@@ -87,17 +115,19 @@ def robot_section(report: Report, *, is_live: bool = False) -> Markup:
         tag("output", first["frames"][first["zero"]]["words"], id="travelled", for_="travel"),
         class_="controls travel script",
     )
+    fixed = "No WebGL in this browser: the drawing of the robot is fixed, but the table follows the sliders."
+    words = "3-D view of the robot; values are in the table."
     picture = tag(
         "figure",
-        script_frame("view", "picture", "3-D view of the robot; values are in the table below."),
-        drawings(report),
+        tag("p", fixed, class_="flat-words", role="status"),
+        tag("div", script_frame("view", "picture", words), drawings(report), class_="stage"),
         view_buttons(),
         # The copy is for printing, because browsers do not print WebGL.
-        tag("img", id="view-copy", class_="copy", alt="3-D view of the robot; values are in the table below"),
-        tag("figcaption", _legend(first), id="view-words"),
+        tag("img", id="view-copy", class_="copy", alt="3-D view of the robot; values are in the table"),
+        caption("Robot", _legend(first), id="view-words"),
     )
-    content = [*head, moving, picture] if first["motion"] else [*head, picture]
-    content += [tag("h3", "Limb rates at the shown pose"), _rates(first)] if first["rows"] else []
+    shown = beside(picture, _rates(first)) if first["rows"] else picture
+    content = [*head, moving, shown] if first["motion"] else [*head, shown]
     note = "The view needs JavaScript; the tables are complete without it."
     return join_markup([*content, tag("noscript", tag("p", note))])
 
@@ -108,16 +138,18 @@ def _still_parts(report: Report) -> Iterator[Markup]:
     for part in report.parts:
         for view, drawing in zip(part.views, part.drawings, strict=True):
             several = len(report.parts) > 1 or report.case.poses_per_task > 1
-            words = view["pose_words"] if report.case.poses_per_task > 1 else f"“{view['name']}”"
+            words = view["pose_words"] if report.case.poses_per_task > 1 else f"task “{view['name']}”"
             if several:
-                yield tag("h3", f"{words}, worst pose" if view["is_worst"] else words)
+                heading = f"{words[0].upper()}{words[1:]}"
+                yield tag("h3", f"{heading}, worst pose" if view["is_worst"] else heading)
+            parts = []
             if shown < _DRAWINGS:
-                source = image_source(_with_fewer_digits(picture([drawing], ".svg")))
-                image = tag("img", src=source, alt=f"Robot, {words}", class_="design")
-                yield tag("figure", image, tag("figcaption", _legend(view, is_still=True)))
+                image = _still(drawing, alt=f"Robot, {words}", class_="design")
+                parts.append(tag("figure", image, caption("Robot", _legend(view, is_still=True))))
             shown += 1
             if view["rows"]:
-                yield _rates(view, None if several else "rates")
+                parts.append(_rates(view, None if several else "rates"))
+            yield beside(*parts)
 
 
 def _legend(view: ViewData, *, is_still: bool = False) -> Markup:
@@ -127,9 +159,16 @@ def _legend(view: ViewData, *, is_still: bool = False) -> Markup:
     forces = tag("span", view["forces_words"], id="forces-words") if view["forces_words"] else ""
     joints = " Dark joints are actuated." if view["joints"] else ""
     if not view["rows"]:
-        return join_markup([forces, " Dotted grey: starting point of the search." if view["reference"] else "", joints])
+        return join_markup(
+            [
+                "pose of the design. ",
+                forces,
+                " Dotted grey: starting point of the search." if view["reference"] else "",
+                joints,
+            ]
+        )
     words = [
-        "Colours of limbs: rate relative to the largest shown; blue negative, grey zero, orange positive.",
+        "colours of limbs show the rate relative to the largest shown; blue negative, grey zero, orange positive.",
         " Bold black: axis of the task's motion",
         ", with a purple helix of its pitch" if view["motion"] and view["motion"]["path"] else "",
         ". Purple arrows: velocities of the platform's corners, not to scale.",
@@ -175,14 +214,15 @@ def _rates(view: ViewData, anchor: str | None = "rates") -> Markup:
         "",
         "share of F",
     ]
+    lengths = aligned(["" if each is None else f"{each:.5g}" for each in frame["lengths"]])
+    texts = aligned([f"{rate:+.6g}" for rate in rates])
+    shares = aligned([f"{100 * rate**2 / total:.1f} %" if total > 0 else "none" for rate in rates])
     body = []
     for k, row in enumerate(view["rows"]):
         rate = rates[k]
         part = rate / largest
         bar = tag("span", tag("i"), class_="bar minus" if rate < 0 else "bar", style=f"--part:{abs(part):.4f}")
-        share = f"{100 * rate**2 / total:.1f} %" if total > 0 else "none"
-        length = frame["lengths"][k]
-        cells = ["" if length is None else f"{length:.5g}", f"{rate:+.6g}", bar, share]
+        cells = [lengths[k], texts[k], bar, shares[k]]
         kinds = ["length number", "rate number", "bars", "share number"]
         body.append(
             tag(
@@ -193,12 +233,12 @@ def _rates(view: ViewData, anchor: str | None = "rates") -> Markup:
             )
         )
     head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
-    caption = tag(
+    head_words = tag(
         "caption",
-        "F = ",
+        "Limb rates: F = ",
         tag("span", f"{frame['F'] if total > 0 else 0:.7g} {view['objective_unit']}".rstrip(), id=anchor and "F-there"),
         ", platform ",
         tag("span", frame["words"], id=anchor and "where"),
     )
-    table = tag("table", caption, tag("thead", head), tag("tbody", *body), id=anchor)
+    table = tag("table", head_words, tag("thead", head), tag("tbody", *body), id=anchor)
     return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label="Limb rates at the shown pose")

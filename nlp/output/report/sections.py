@@ -20,6 +20,7 @@ from ...words.lines import (
     costliest_words,
     counted,
     evidence_lines,
+    followed_words,
     headline,
     is_unasked_singularity,
     relaxation_sentences,
@@ -27,7 +28,7 @@ from ...words.lines import (
     task_words,
     tolerance_line,
 )
-from ...words.numbers import number
+from ...words.numbers import key_words, number
 from ...words.objective import objective_words
 from ...words.path import along_table, path_proof_lines
 from ...words.robot import combined_design_table, robot_tables, solved_design_table
@@ -37,9 +38,9 @@ from ...words.text import Line, TextTable
 from ...words.workspace import proof_lines, proof_tables
 from .charts import Curve, Spot, line_chart
 from .exploration import optima, surroundings
-from .markup import Markup, image_source, join_markup, paragraphs, tag
+from .markup import Markup, beside, caption, image_source, join_markup, paragraphs, tag
 from .report import Report
-from .robotview import robot_section
+from .robotview import first_still, robot_section
 from .tables import html_table
 
 
@@ -79,8 +80,9 @@ def _active_table(result: SolveResult | CombinedData, optimality: Evidence, size
         return tag("p", "No bound or limit is active.")
     table = active_table(result, size, is_answer=is_answer)
     words = {cell for row in table.rows for cell in row}
-    caption = " and ".join(word for word in ("violated", "active") if word in words).capitalize()
-    return html_table(table, f"{caption} bounds and limits")
+    states = " and ".join(word for word in ("violated", "active") if word in words)
+    multipliers = ": multipliers" if is_answer else ""
+    return html_table(table, f"{states} bounds and limits{multipliers}")
 
 
 def certificate_section(report: Report) -> Markup:
@@ -146,32 +148,36 @@ def bound_chart(history: Sequence[Sequence[float]]) -> list[Markup]:
         words=words,
         labels=("time, s", "F"),
     )
-    return [
-        tag("figure", chart, tag("figcaption", f"Proved bound (blue) and best known F (orange) over time. {words}"))
-    ]
+    what = f"proved bound (blue) and best known F (orange). {words}"
+    return [tag("figure", chart, caption("Bound over time", what))]
 
 
 def published_section(report: Report) -> Markup:
     """Return the table of published and computed values."""
     if report.check is None:
         return Markup("")
-    caption = "Published and computed values"
-    return html_table(published_table(report.check), caption, id="compared")
+    return html_table(published_table(report.check), "Published and computed values", id="compared")
 
 
 def sections(report: Report, *, is_live: bool = False) -> list[tuple[str, str, Markup]]:
     """Return anchor, heading and content of every section; some have no content.
 
     The order answers a reader's questions: the problem, the design, its evidence, its limits, alternatives, and the
-    data to repeat the solve. A live view replaces the 3-D view.
+    data to repeat the solve. A live view replaces the 3-D view. Without it, the robot and its dimensions come first.
     """
     # The robot of a schedule is that at the first point of the path.
     first = "" if report.case.over_path is None else " at the first point of the path"
-    return [
+    problem = [
         ("case", "Problem", _case(report)),
         ("schedule", "Schedule along the path", _schedule(report)),
+    ]
+    design = [
         ("robot", f"Robot and task motion{first}", robot_section(report, is_live=is_live)),
         ("result", f"Result{first}", _result(report)),
+    ]
+    return [
+        *(problem if is_live else design),
+        *(design if is_live else problem),
         ("evidence", "Evidence of optimality", evidence_section(report)),
         ("certificate", "Certificate of the global optimum", certificate_section(report)),
         ("workspace", "Proof over the workspace", workspace_section(report)),
@@ -182,6 +188,24 @@ def sections(report: Report, *, is_live: bool = False) -> list[tuple[str, str, M
         ("published", "Comparison with published values", published_section(report)),
         ("origin", "Case file and versions", _origin(report)),
     ]
+
+
+def first_screen(report: Report) -> Markup:
+    """Return the robot and the table of its dimensions, which a live view replaces."""
+    result = report.result
+    robot = result.robot
+    if robot is None:
+        return first_still(report)
+    if isinstance(result, CombinedResult):
+        table = combined_design_table(report.case, result.combined, robot)
+    else:
+        table = solved_design_table(report.case, result, robot)
+    return beside(first_still(report), html_table(table, _design_words(report)))
+
+
+def _design_words(report: Report) -> str:
+    """Return the caption of the table of dimensions."""
+    return "Dimensions and pose" if report.is_answer else "Final point of the search, not an optimum"
 
 
 def answer(report: Report) -> Markup:
@@ -223,9 +247,10 @@ def _schedule(report: Report) -> Markup:
     parts = [paragraphs(each for each in found if isinstance(each, Line))]
     if report.schedule:
         names = ", ".join(result.schedule.names)
-        words = f"Objective over the path and {names}, with the schedule and the best constant. Below: rates."
-        image = tag("img", src=image_source(report.schedule), alt=words)
-        parts.append(tag("figure", image, tag("figcaption", words)))
+        name = f"Schedule of {names} along the path"
+        words = "objective with the schedule and the best constant, and rates below it"
+        image = tag("img", src=image_source(report.schedule), alt=f"{name}: {words}")
+        parts.append(tag("figure", image, caption(name, words)))
     parts += [html_table(each, each.name.capitalize()) for each in found if isinstance(each, TextTable)]
     if result.schedule.names:
         parts.append(html_table(schedule_table(result.schedule), "Points of the path", id="points"))
@@ -241,9 +266,7 @@ def _objective_lines(case: Case) -> Iterator[str]:
         return
     for k, task in enumerate(case.tasks):
         word = {"max": "as large as possible", "min": "as small as possible"}[task.sense.value]
-        motion = (
-            f"motion that follows the {task.follows}" if task.follows else task_words(task_data(case, k), case.units)
-        )
+        motion = followed_words(task) if task.follows else task_words(task_data(case, k), case.units)
         yield f"Task “{task.name}”: F {word} for a {motion}."
     yield "F is the sum of the squared rates at which the limbs' unit wrenches do work in the task's motion."
 
@@ -272,7 +295,8 @@ def _variable_lines(case: Case, names: list[str]) -> list[str]:
 def _case(report: Report) -> Markup:
     """Return the problem of the case in sentences."""
     case, first = report.case, report.parts[0]
-    lines = [f"{case.model.description}.", *(f"Note: {remark}." for remark in case.model.remarks)]
+    words = case.model.description
+    lines = [f"{words[:1].upper()}{words[1:]}.", *(f"Note: {remark}." for remark in case.model.remarks)]
     lines += _objective_lines(case)
     if len(case.tasks) > 1:
         lines.append(f"Method that combines the tasks: {case.method.value}.")
@@ -293,12 +317,12 @@ def _case(report: Report) -> Markup:
         lines.append(_poses_line(case))
     limits = report.result.limits
     if limits:
-        listed = ", ".join(f"{row.key} {row.limit:g} {row.unit}".strip() for row in limits)
+        listed = ", ".join(f"{key_words(f'limits.{row.key}')} {row.limit:g} {row.unit}".strip() for row in limits)
         lines.append(f"Limits: {listed}.")
     search = case.search
     if names:
         lines.append(f"Search: {counted(search.starts, 'starting point')}, seed {search.seed}.")
-    return paragraphs(lines)
+    return tag("div", paragraphs(lines), class_="prose")
 
 
 def _result(report: Report) -> Markup:
@@ -315,13 +339,14 @@ def _combined_result(report: Report, result: CombinedResult) -> Markup:
     """Return the design for the combined tasks, then the separate optimum of each task."""
     case, combined = report.case, result.combined
     parts = [paragraphs(choice_lines(result.choice, result.rounding, is_answer=report.is_answer))]
-    robot = result.robot
+    robot, tables, ranks = result.robot, [], []
     if robot is not None:
-        words = "Dimensions and pose" if report.is_answer else "Final point of the search, not an optimum"
-        parts.append(html_table(combined_design_table(case, combined, robot), words, id="design"))
-        parts += [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
+        tables.append(html_table(combined_design_table(case, combined, robot), _design_words(report), id="design"))
+        ranks = [paragraphs(singularity_lines(each, case.units)) for each in combined.settings or [robot]]
     if combined.tasks:
-        parts.append(html_table(outcome_table(combined, result.tasks), "F of each task", id="outcomes"))
+        outcomes = outcome_table(combined, result.tasks)
+        tables.append(html_table(outcomes, "Tasks: F at this point and separately", id="outcomes"))
+    parts += [beside(*tables), *ranks]
     parts.append(paragraphs(change_lines(result)))
     parts += [tag("p", f"Note: {notice}.") for notice in combined.notices]
     parts += [tag("p", f"Violated: {name}", class_="warning") for name in combined.violated]
@@ -337,14 +362,14 @@ def _task_tables(case: Case, result: SolveResult, anchor: str) -> list[Markup]:
     robot, reached = result.robot, result.reached is not None
     if robot is None:
         return [tag("p", "The robot does not exist at the final point of the search.", class_="warning")]
-    caption = "Final point of the search" if reached else "Dimensions and pose"
-    parts = [html_table(solved_design_table(case, result, robot), caption, id=anchor)]
+    words = "Final point of the search" if reached else "Dimensions and pose"
+    design = html_table(solved_design_table(case, result, robot), words, id=anchor)
     first, *others = robot_tables(case, robot)
-    caption = "Limbs" if robot.several is None else "Poses"
-    parts.append(html_table(first, caption, id=f"{anchor}-{first.name}"))
+    words = "Limbs" if robot.several is None else "Poses"
+    parts = [beside(design, html_table(first, words, id=f"{anchor}-{first.name}"))]
     for table in others:
-        caption = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
-        parts.append(tag("details", tag("summary", caption), html_table(table, caption, id=f"{anchor}-{table.name}")))
+        words = f"{table.name.replace('-', ' ').capitalize()} by pose and limb"
+        parts.append(tag("details", tag("summary", words), html_table(table, words, id=f"{anchor}-{table.name}")))
     parts_by_limb = limb_part_table(case, robot)
     if parts_by_limb is not None:
         parts.append(html_table(parts_by_limb, "Actuation and constraint parts of F by limb", id=f"{anchor}-actuation"))
@@ -358,19 +383,19 @@ def _limits(report: Report) -> Markup:
     limits, margins = report.result.limits, report.result.margins
     if not limits:
         return Markup("")
-    caption = "Margin of each limit and effect on F"
+    words = "Limits: margin and effect on F"
     held = limits_title(report.case, report.result.workspace or report.result.path)
-    caption += f": {held}" if held else ""
+    words += f", {held}" if held else ""
     robot = report.result.robot
     size = 0.0 if robot is None else size_of_F(robot, report.result.F or 0.0)
-    parts = [html_table(limit_table(limits, size), caption, id="limit")]
-    costliest = costliest_words(limits)
+    parts = [html_table(limit_table(limits, size), words, id="limit")]
+    costliest = costliest_words(limits, in_words=True)
     if costliest is not None:
         parts.append(tag("p", costliest))
     result = report.result
     if isinstance(result, SolveResult) and result.tolerance is not None:
         parts.append(paragraphs([tolerance_line(result.tolerance, result.F, report.case.units)]))
-    every = html_table(margin_table(margins), "Margins, positive within the limit")
+    every = html_table(margin_table(margins), "All margins: positive within the limit")
     parts.append(tag("details", tag("summary", f"All margins ({len(margins)})"), every))
     return join_markup(parts)
 
@@ -379,7 +404,7 @@ def _origin(report: Report) -> Markup:
     """Return versions, search settings, and the case file."""
     result = report.result
     origin = origin_table(result.versions, report.case.search, result.seconds)
-    text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case file")
+    text = tag("pre", tag("code", report.text, id="case-text"), tabindex="0", aria_label="Case file", class_="file")
     copy = tag(
         "p",
         tag("button", "Copy case file", type="button", id="copy"),
@@ -387,6 +412,5 @@ def _origin(report: Report) -> Markup:
         tag("span", id="copied", role="status"),
         class_="controls script",
     )
-    return join_markup(
-        [html_table(origin, "Versions and search settings", id="versions"), tag("h3", "Case file"), copy, text]
-    )
+    case = tag("div", tag("h3", "Case file"), copy, text, class_="fill")
+    return beside(html_table(origin, "Versions and search settings", id="versions"), case)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from ...words.numbers import key_words
 from ...words.text import Line, TextTable
 from .markup import Markup, join_markup, tag
 
@@ -18,6 +19,10 @@ from .markup import Markup, join_markup, tag
 _ONE_LINE, _TALL = 8, 16
 #: Largest number of characters of a text that is not cut in such a table.
 _LONG = 30
+#: Largest number of characters of a text in one line on a telephone, where its table scrolls.
+_ONE_SCREEN = 90
+#: Length of a header above which it is broken into lines.
+_LONG_HEAD = 14
 #: Length of a number with its unit below which its cell is not wrapped.
 _SHORT = 24
 #: Number at the start of a text: sign and digits before the point, and everything after them.
@@ -37,32 +42,38 @@ class _Content(NamedTuple):
 def html_table(table: TextTable, caption: str, **attributes: object) -> Markup:
     """Return an HTML table, whose first column names the rows; a wide table can be scrolled, also by keyboard.
 
+    Keys of limits in caption and headers become words; cells keep the keys, because users copy them into commands.
+
     Args:
         table: table of texts.
         caption: caption of the table.
         attributes: attributes of the element, as for :func:`tag`.
     """
+    caption = key_words(caption)
+    caption = f"{caption[:1].upper()}{caption[1:]}"
     kept = len(table.rows) - table.folded
     shown = _table_element(_content(replace(table, rows=table.rows[:kept])), caption, **attributes)
     if not table.folded:
-        return shown
+        return shown if shown.startswith("<div") else tag("div", shown, class_="table")
     words = f"{table.folded} {table.folded_words}"
     rest = replace(table, rows=table.rows[kept:], folded=0)
     anchor = f"{attributes['id']}-folded" if "id" in attributes else None
     folded = tag("details", tag("summary", words), html_table(rest, f"{caption}: {words}", id=anchor))
-    return join_markup([shown, folded])
+    return tag("div", shown, folded, class_="table")
 
 
 def _table_element(content: _Content, caption: str, **attributes: object) -> Markup:
     """Return the element of a table with its box, and above it the texts of all rows."""
     headers, rows, above = content
     # An empty header is an ordinary cell, since it names nothing.
-    head = tag("tr", *(tag("th", header, scope="col") if header else tag("td") for header in headers))
+    columns = [[row[k] for row in rows] for k in range(len(headers))]
+    heads = zip(headers, columns, strict=True)
+    head = tag("tr", *(_head(header, texts) if header else tag("td") for header, texts in heads))
     is_long = len(rows) >= _ONE_LINE
-    aligned = [_aligned([row[k] for row in rows]) for k in range(len(headers))]
+    cells_of = [aligned(texts) for texts in columns]
     body = []
     for place, row in enumerate(rows):
-        first, *others = (column[place] for column in aligned)
+        first, *others = (column[place] for column in cells_of)
         cells = [_cell(text, content, is_long=is_long) for text, content in zip(row[1:], others, strict=True)]
         kind = "long" if len(row[0]) > _LONG else None
         body.append(tag("tr", tag("th", first, scope="row", class_=kind), *cells))
@@ -75,7 +86,7 @@ def _table_element(content: _Content, caption: str, **attributes: object) -> Mar
 
 def _content(table: TextTable) -> _Content:
     """Return headers and rows, with units at their numbers and without columns that are equal in all rows."""
-    headers = [header.replace("\n", ", ") for header in table.headers]
+    headers = [key_words(header).replace("\n", ", ") for header in table.headers]
     rows = [[_related(cell.words if isinstance(cell, Line) else str(cell)) for cell in row] for row in table.rows]
     above: list[str] = []
     at = headers.index("unit") if table.with_unit and "unit" in headers else None
@@ -122,7 +133,7 @@ def _related(text: str) -> str:
     return text.replace("<= ", "\N{LESS-THAN OR EQUAL TO} ").replace(">= ", "\N{GREATER-THAN OR EQUAL TO} ")
 
 
-def _aligned(texts: Sequence[str]) -> list[object]:
+def aligned(texts: Sequence[str]) -> list[object]:
     """Return the cells of a column; digits before the point have the same width in all of them, so points align."""
     found = [_NUMBER.fullmatch(text) for text in texts]
     numbers = [each for each in found if each is not None]
@@ -138,9 +149,16 @@ def _aligned(texts: Sequence[str]) -> list[object]:
     ]
 
 
+def _head(header: str, texts: Sequence[str]) -> Markup:
+    """Return the header of a column; a long header of numbers is broken into lines of the numbers' width."""
+    is_wide = len(header) > _LONG_HEAD and all(not text or is_number(text) for text in texts)
+    return tag("th", header, scope="col", class_="wide" if is_wide else None)
+
+
 def _cell(text: str, content: object, *, is_long: bool) -> Markup:
     """Return a cell of a table, with a class for a short number; a long text of a long table is cut to one line."""
     if is_long and len(text) > _LONG:
         return tag("td", tag("details", tag("summary", content), class_="cell"))
-    kind = "long" if len(text) > _LONG else "number" if len(text) < _SHORT and is_number(text) else None
+    long = "long line" if len(text) <= _ONE_SCREEN else "long"
+    kind = long if len(text) > _LONG else "number" if len(text) < _SHORT and is_number(text) else None
     return tag("td", content, class_=kind)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import groupby
 
+from ...case.case import Case
 from ...results.parts import VersionsData
+from ...words.numbers import key_words, number, spaced
 from ...words.tables import origin_table
 from ...words.text import Line, TextTable
-from .markup import Markup, join_markup, paragraphs, tag
+from .markup import Markup, beside, join_markup, paragraphs, tag
 from .tables import html_table
 
 
@@ -20,16 +23,34 @@ def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> M
         words: sentence below the tables.
     """
     _, *rest = items
-    parts = [
-        paragraphs([each]) if isinstance(each, Line) else html_table(each, each.title, id=f"{key}-{each.name}")
-        for each in rest
-    ]
+    parts = []
+    for is_line, group in groupby(rest, key=lambda each: isinstance(each, Line)):
+        found = list(group)
+        if is_line:
+            parts.append(paragraphs(each for each in found if isinstance(each, Line)))
+        else:
+            tables = [each for each in found if isinstance(each, TextTable)]
+            parts.append(beside(*(html_table(each, each.title, id=f"{key}-{each.name}") for each in tables)))
     return join_markup([*parts, tag("p", words)])
+
+
+def dimensions_table(case: Case) -> Markup:
+    """Return the table of the robot's dimensions, which are fixed."""
+    rows = []
+    every = iter(case.fixed_parameters("the page has fixed dimensions").tolist())
+    for item in case.model.parameters:
+        names = case.component_names(item)
+        values = [case.units.shown(next(every), item.dimension) for _ in names]
+        largest, unit = max(map(abs, values)), case.units.label(item.dimension)
+        rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
+    table = TextTable(("", "value", "unit"), tuple(rows), "dimensions", with_unit=(1,))
+    return html_table(table, "Dimensions", id="dimensions")
 
 
 def refuting_place(claim: str, pose: str, command: str) -> Markup:
     """Return a violated claim with its pose, and the command that shows the pose."""
-    return join_markup([tag("h3", claim), tag("p", f"At {pose}."), shown_command(command)])
+    name, space, rest = key_words(claim).partition(" ")
+    return join_markup([tag("h3", f"{spaced(name)}{space}{rest}"), tag("p", f"At {pose}."), shown_command(command)])
 
 
 def shown_command(command: str) -> Markup:
@@ -41,4 +62,4 @@ def origin(versions: VersionsData, text: str) -> Markup:
     """Return versions and the case file."""
     table = html_table(origin_table(versions), "Versions", id="versions")
     shown = tag("pre", tag("code", text, id="case-text"), tabindex="0", aria_label="Case file")
-    return join_markup([table, tag("h3", "Case file"), shown])
+    return beside(table, tag("div", tag("h3", "Case file"), shown, class_="fill"))

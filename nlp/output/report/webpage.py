@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .markup import NO_LIVE_VIEW, LiveView, contents_and_body, packed_plotly, whole_page
+from .markup import NO_LIVE_VIEW, LiveView, Markup, contents_and_body, packed_plotly, whole_page
 from .report import Report
-from .sections import answer, sections
+from .sections import answer, first_screen, sections
 
 
 def page_of(report: Report, live: LiveView = NO_LIVE_VIEW) -> str:
@@ -21,12 +21,12 @@ def page_of(report: Report, live: LiveView = NO_LIVE_VIEW) -> str:
     has_maps = any(part.planes for part in report.parts)
     return whole_page(
         report.case.title or report.case.name,
-        f"{report.case.name}, robot {report.case.model.name}",
+        f"Report: {report.case.name}, robot {report.case.model.name}",
         answer(report),
         body,
         contents=contents,
         scripts=("tools.js", "joints.js", "robot.js", "page.js"),
         data=report.as_data(is_live=live.is_live),
         plotly=packed_plotly() if has_maps or not live.is_live else "",
-        live=live.markup,
+        live=live.shown(first_screen(report) if live.is_live else Markup("")),
     )

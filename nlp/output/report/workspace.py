@@ -13,9 +13,8 @@ from ...results.claims import refuted_claims, worst_claim
 from ...results.workspace import WorkspaceResult
 from ...system.jsonvalues import json_data
 from ...words.claims import claim_words
-from ...words.numbers import number
+from ...words.numbers import key_words
 from ...words.poses import pose_words
-from ...words.text import TextTable
 from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
 from ..pictures.figures import page_pictures
@@ -23,6 +22,8 @@ from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend,
 from .markup import (
     Markup,
     answer_box,
+    beside,
+    caption,
     contents_and_body,
     image_source,
     join_markup,
@@ -31,8 +32,7 @@ from .markup import (
     tag,
     whole_page,
 )
-from .tables import html_table
-from .verdicts import origin, refuting_place, shown_command, shown_verdicts
+from .verdicts import dimensions_table, origin, refuting_place, shown_command, shown_verdicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,9 @@ def workspace_page(report: WorkspaceReport) -> str:
     case, result = report.case, report.result
     title = case.title or case.name
     sections = [
+        ("robot", "Robot at the worst pose", beside(_robot(report), _dimensions(report))),
         ("verdicts", "Verdicts over the workspace", _verdicts(report)),
         ("refuted", "Violated limits and singularities", _refuted(report)),
-        ("robot", "Robot at the worst pose", join_markup([_robot(report), _dimensions(report)])),
         ("slices", "Slices of the workspace", _slices(report)),
         ("origin", "Case file and versions", origin(result.versions, report.text)),
     ]
@@ -69,7 +69,7 @@ def workspace_page(report: WorkspaceReport) -> str:
     words = verdict_words(result)
     return whole_page(
         f"{title} - workspace",
-        f"{case.name}, robot {case.model.name}, workspace",
+        f"Workspace: {case.name}, robot {case.model.name}",
         answer_box([f"{words[0].upper()}{words[1:]}."], is_answer=result.proved),
         body,
         heading=title,
@@ -99,15 +99,8 @@ def _refuted(report: WorkspaceReport) -> Markup:
 def _dimensions(report: WorkspaceReport) -> Markup:
     """Return the dimensions of the robot, and the tolerance of its joint centres."""
     case = report.case
-    rows = []
-    for item in case.model.parameters:
-        shown = report.result.parameters[item.name]
-        values = shown if isinstance(shown, tuple) else (shown,)
-        largest, unit = max(map(abs, values)), case.units.label(item.dimension)
-        names = case.component_names(item)
-        rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
-    table = html_table(TextTable(("", "value", "unit"), tuple(rows), "dimensions"), "Dimensions", id="dimensions")
-    return join_markup([table, paragraphs(tolerance_lines(case, report.result.joint_centre))])
+    table = dimensions_table(case)
+    return tag("div", table, paragraphs(tolerance_lines(case, report.result.joint_centre)))
 
 
 def _robot(report: WorkspaceReport) -> Markup:
@@ -121,8 +114,8 @@ def _robot(report: WorkspaceReport) -> Markup:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
     image = picture_element(wide, narrow, alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
-    figure = tag("figure", image, tag("figcaption", f"Robot at its worst pose, {at}: {claim_words(worst)}."))
-    return join_markup([figure, shown_command(report.command(worst.pose))])
+    words = caption("Robot at the worst pose", f"{key_words(claim_words(worst))}; at {at}.")
+    return tag("figure", image, words, shown_command(report.command(worst.pose)))
 
 
 def _slices(report: WorkspaceReport) -> Markup:
@@ -140,8 +133,9 @@ def _slices(report: WorkspaceReport) -> Markup:
     legend.append(tag("li", tag("span", class_="swatch outline"), "workspace"))
     notes = [f"{note[0].upper()}{note[1:]}." for note in slices_notes(slices)]
     images = [
-        tag("img", src=image_source(content, "png"), alt=f"Slice of {each.names[0]} and {each.names[1]}")
+        tag("figure", tag("img", src=image_source(content, "png"), alt=f"Slice: {words}"), caption("Slice", words))
         for each, content in zip(slices, slice_images(report.case, slices), strict=True)
+        for words in [f"{each.names[0]} and {each.names[1]}"]
     ]
     return join_markup(
         [

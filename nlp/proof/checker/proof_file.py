@@ -12,6 +12,7 @@ A proof of a program's optimum has one claim. A claim is proved by one of
     singular    the opposite: two poses, or a pose of each of two robots within the tolerance, with determinants of
                 opposite signs
     boxes       a tree of boxes; on each of them a quantity is not below (above) its bound
+    settings    a tree of boxes of poses, with values of the settings for each of its leaves
     lengths     the bounds of the lengths of a leg, from which a limit on its stroke follows
 
 and, for a claim about every robot within a joint-centre tolerance, also by
@@ -86,7 +87,8 @@ class ProofClaim:
         tree: bytes of the tree of boxes; empty for a claim without a tree, or with a packed tree.
         sides: two poses (6,) with determinants of opposite signs. Each pose is followed by the m joint-centre errors
             (3 m,) of its robot if these are not 0. For a leg length of one robot: two directions (3,) of the leg, in
-            the world frame and in the platform frame. Empty for other reasons.
+            the world frame and in the platform frame. For settings: the value of each setting on each leaf of the
+            tree. Empty for other reasons.
         packed: compressed tree from a proof file, unpacked when the claim is checked; None for a claim that was not
             read from a file.
     """
@@ -133,6 +135,7 @@ class Premises:
         leg_error: largest error of a leg's length.
         joint_centre: largest error of each joint centre in the claims; 0 for the nominal robot.
         position_set: set of positions, from :func:`set_premise`; empty for all positions of the box.
+        settings: names of the settings of which any value may do at a pose; empty for other claims.
     """
 
     workspace: Poses
@@ -141,6 +144,7 @@ class Premises:
     leg_error: float
     joint_centre: float = 0.0
     position_set: Poses = ()
+    settings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -252,7 +256,7 @@ class _ClaimTable:
 
     name: str
     sense: str
-    reason: Literal["program", "regular", "singular", "boxes", "lengths", "one machine", "second order"]
+    reason: Literal["program", "regular", "singular", "boxes", "settings", "lengths", "one machine", "second order"]
     bound: float | None
     graph: str
     tree: str

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from ....models import FloatArray, Model, frozen_array
+from ....models.model import joint_parameter
 from ...case.case import Case
 from ...case.checks import check_determined_joints
+from ...case.limits.joints import JointAngle, MountingPose
 from ...case.pose import Free
 from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
@@ -67,6 +70,43 @@ def workspace_of_case(case: Case) -> Workspace:
     return with_dependent(case, case.world_workspace or case.workspace)
 
 
+def check_changing(case: Case, names: Sequence[str]) -> None:
+    """Refuse what is not supported along a path: free dimensions, and some robots and limits while dimensions change.
+
+    Args:
+        case: the case.
+        names: dimensions that change along the path: components of the robot's parameters.
+
+    Raises:
+        CaseError: another dimension is free, the robot does not have six straight legs, or a limit is about home.
+    """
+    case.fixed_parameters("a path is judged with fixed dimensions", names)
+    check_moving(case, names)
+
+
+def check_moving(case: Case, names: Sequence[str]) -> None:
+    """Refuse robots and limits that are not supported along a path while dimensions change.
+
+    Args:
+        case: the case; its other dimensions may be free.
+        names: dimensions that change along the path: components of the robot's parameters.
+
+    Raises:
+        CaseError: the robot does not have six straight legs, or a limit is about home.
+    """
+    if not names:
+        return
+    first = case.parameter_name(names[0])
+    joints = [joint_parameter(label) for label in case.model.locked]
+    if not (has_straight_legs(case.model) or all(name in joints for name in names)):
+        fault = f"{case.model.name} is not a robot with six straight legs, for which alone this is proved"
+        raise CaseError(f"robot.parameters.{first}.per", f"{fault}; give the drive as a joint", "path", case.source)
+    for limit in case.limits:
+        if isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose):
+            fault = f"home has no {first}, which changes along the path; state mounting axes"
+            raise CaseError(f"limits.{limit.key}.about", fault, "home", case.source)
+
+
 def check_leg_error(case: Case, leg_error: float) -> None:
     """Check a leg-length error.
 
@@ -89,8 +129,12 @@ def has_straight_legs(model: Model) -> bool:
 
 
 def legs_of(case: Case) -> Legs | None:
-    """Return the :func:`joint_centres` of a robot with six straight legs; None for other robots."""
-    return joint_centres(case) if has_straight_legs(case.model) else None
+    """Return the :func:`joint_centres` of a robot with six straight legs; None for other robots.
+
+    The result is None, too, if a dimension is free or changes along a path.
+    """
+    is_fixed = not any(isinstance(value, Free) for name in case.parameters for value in case.components(name))
+    return joint_centres(case) if is_fixed and has_straight_legs(case.model) else None
 
 
 def joint_centres(case: Case) -> Legs:

@@ -25,6 +25,9 @@ _POINTS, _FAR = 512, math.radians(150)
 
 def closed_form_along(case: Case, path: ProgrammedPath) -> ClosedForm:
     """Return a robot with fixed dimensions, with closed forms of the unknowns that are valid all along a path."""
+    if path.settings.names:
+        # Joint coordinates are not sampled while dimensions change.
+        return closed_form(case.model, with_angles=False)
     closed = closed_form(case.model)
     left = {each.name for each in closed.model.unknowns}
     names = [each.name for each in case.model.unknowns if each.dimension is Dimension.ANGLE and each.name not in left]

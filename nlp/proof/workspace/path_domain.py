@@ -77,12 +77,26 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
         NotJudgedError: the robot cannot be judged, or its loops are not closed at the first point.
     """
     first = cover.points(cover.pieces[:1], 0.0)[0]
-    near = partial(unknowns_at, case, closed, box.pose(first))
+    near = partial(unknowns_at, at_first_settings(case, box, first), closed, box.pose(first))
     design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
     # An equation whose coordinate hardly changes counts as dependent on other equations, but must be satisfied.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
         raise NotJudgedError("the loop equations of the robot have no known solution at the first point of the path")
     return design
+
+
+def at_first_settings(case: Case, box: PoseBox, first: FloatArray) -> Case:
+    """Return the case with the settings at the first point (c,) of a path; unchanged for a path without settings."""
+    if not box.settings:
+        return case
+    values = dict(zip(box.settings, first[box.of_pose :].tolist(), strict=True))
+    parameters = {
+        item.name: [
+            values.get(name, value) for name, value in zip(item.components, case.components(item.name), strict=True)
+        ]
+        for item in case.model.parameters
+    }
+    return replace(case, parameters=parameters)
 
 
 def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[PoseBox, Workspace]:
@@ -100,6 +114,8 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
     places = [each.index for each in found.dependent]
     if not places:
         return box, workspace
+    if box.settings:
+        raise NotJudgedError("dependent coordinates of the pose are not judged while joints change along the path")
     stated, angle = (*workspace.position, *workspace.turns.angles), _STILL
     length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in workspace.position])
     moved = [k for k in places if np.ptp(ends_of(stated[k])) > (length if k < 3 else angle)]

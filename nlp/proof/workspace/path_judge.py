@@ -14,11 +14,9 @@ import casadi as ca
 
 from ...case.case import Case
 from ...case.checks import check_determined_joints
-from ...case.limits.joints import JointAngle, MountingPose
 from ...case.motors import ActuatorQuantity
-from ...case.pose import Free
 from ...case.workspace import Workspace
-from ...errors import CaseError, InputError, UncoveredError
+from ...errors import UncoveredError
 from ...interruption import one_call, within
 from ...path.path import ProgrammedPath
 from ...path.settings import case_along
@@ -26,7 +24,7 @@ from ...program.layout import robot_length
 from ..boxes.search import TOO_SMALL
 from ..enclosure.engine import kernel
 from ..statement.claims import ACTUATED, CONSTRAINTS, REGULAR, Claim, ClaimKind, dependent_claims
-from ..statement.fixed_robot import has_straight_legs
+from ..statement.fixed_robot import check_changing
 from ..statement.motors import in_motion, in_path_motion, motor_claims
 from ..statement.tolerance import Directions
 from .judgement import Judgement
@@ -54,39 +52,6 @@ TIME_LIMIT = 600.0
 _PART, GAP = 0.5, 1e-3
 #: Reason for quantities with an operation without an interval rule.
 _NO_RULE = "its expression contains an operation without an interval rule"
-
-
-def check_changing(case: Case, names: Sequence[str], *, sampling: Sampling | None = None) -> None:
-    """Refuse what is not supported while dimensions change along a path.
-
-    Args:
-        case: the case.
-        names: names of these dimensions in the robot.
-        sampling: rule for knots of the path; None without knots.
-
-    Raises:
-        CaseError: another dimension is free, the robot does not have six straight legs, or a limit is about home.
-        InputError: knots are requested.
-    """
-    every = {
-        name: value
-        for item in case.model.parameters
-        for name, value in zip(item.components, case.components(item.name), strict=True)
-    }
-    for name, value in every.items():
-        if isinstance(value, Free) and name not in names:
-            fault = "is free, and a path is judged with fixed dimensions: give it with --set, or a result with --of"
-            raise CaseError(f"robot.parameters.{name}", fault, source=case.source)
-    first = case.parameter_name(names[0])
-    if not has_straight_legs(case.model):
-        fault = f"{case.model.name} is not a robot with six straight legs, for which alone this is proved"
-        raise CaseError(f"robot.parameters.{first}.per", f"{fault}; give the drive as a joint", "path", case.source)
-    for limit in case.limits:
-        if isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose):
-            fault = f"home has no {first}, which changes along the path; state mounting axes"
-            raise CaseError(f"limits.{limit.key}.about", fault, "home", case.source)
-    if sampling is not None:
-        raise InputError(f"--csv: actuator coordinates are not tabulated while {first} changes along the path")
 
 
 @one_call
@@ -121,10 +86,7 @@ def judge_path(
     cover, box, workspace = covered(path, robot_length(case))
     case = replace(case_along(case, path.settings), workspace=workspace)
     case.refuse_settings("along a path, settings that move change the speeds of the actuators")
-    if path.settings.names:
-        check_changing(case, path.settings.names, sampling=sampling)
-    else:
-        case.fixed_parameters("a path is judged with fixed dimensions")
+    check_changing(case, path.settings.names)
     check_determined_joints(case.model, "path", case.source)
     if not path.is_timed:
         case.require_motion(", or a path that states times")

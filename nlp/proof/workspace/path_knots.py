@@ -108,8 +108,11 @@ def knots_of(case: Case, path: ProgrammedPath, cover: PathCover, workspace: Work
         sampling: rule for the knots.
 
     Raises:
-        InputError: there are too many knots.
+        InputError: there are too many knots, or a distance is requested while dimensions change along the path.
     """
+    if sampling.within is not None and path.settings.names:
+        name = case.parameter_name(path.settings.names[0])
+        raise InputError(f"--within: is not proved while {name} changes along the path; use --step")
     if sampling.within is not None:
         return knots_within(case, path, cover, workspace, sampling.within)
     return stepped_knots(case, path, sampling.step or float(path.lengths.sum()) / _STEPS or 1.0)
@@ -147,7 +150,8 @@ def _with_joints(case: Case, path: ProgrammedPath, segments: NDArray[np.intp], e
     q = np.zeros((0, 0))
     for begin in range(0, len(ends), block):
         rows = slice(max(begin - 1, 0), begin + block)
-        found = [inverse(case, *path.poses_at(segments[rows], ends[rows]), follow="previous")]
+        at = segments[rows], ends[rows]
+        found = [inverse(case, *path.poses_at(*at), follow="previous", changing=path.settings.by_name(*at))]
         turning = [each == "actuator_angle" for each in found[0].measures]
         own = found[0].coordinates
         if begin:

@@ -131,7 +131,7 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
     points = spread_points(path, most, [(each.segment, each.parameter) for each in places_of(judged)])
     poses = path.poses_at(*points)
     try:
-        joints: InversePoses | None = inverse(case, *poses)
+        joints: InversePoses | None = inverse(case, *poses, changing=path.settings.by_name(*points))
     except InputError:
         joints = None
     speeds = np.zeros((len(points.parameters), 0))
@@ -140,7 +140,10 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
         poses = poses._replace(positions=joints.positions, rotations=joints.rotations)
     elif joints is not None:
         speeds = np.einsum("pai,pi->pa", joints.rates, twists_at(path, points))
-    numbers, left_out = _numbers(replace(judged, case=case), poses, joints)
+        if joints.resets is not None:
+            changes = path.settings.changes(points.segments) / path.durations[points.segments, None]
+            speeds += np.einsum("pad,pd->pa", joints.resets, changes)
+    numbers, left_out = _numbers(replace(judged, case=case), points, poses, joints)
     if path.is_timed:
         numbers = (*numbers, *_own_speeds(case, speeds))
     keys, margins = _margins(numbers, len(points.parameters))
@@ -155,9 +158,9 @@ def places_of(judged: Judgement) -> list[Place]:
 
 
 def _numbers(
-    judged: Judgement, poses: Poses, joints: InversePoses | None
+    judged: Judgement, points: Points, poses: Poses, joints: InversePoses | None
 ) -> tuple[tuple[SampledNumber, ...], tuple[str, ...]]:
-    """Return the quantities of claims at poses, and the keys of limits without values."""
+    """Return the quantities of claims at points of the path, and the keys of limits without values."""
     case, closed = judged.case, closed_form_along(judged.case, judged.path)
     motors, lost = list(motor_claims(case)), list[Claim]()
     if judged.path.is_timed:  # a path with times defines speeds; powers from [motion] are not shown
@@ -167,12 +170,17 @@ def _numbers(
     keys = [each.key for each in (*claims, *lost) if each.limit is not None]
     if joints is None and closed.model.unknowns:
         return (), tuple(dict.fromkeys(keys))
+    settings = judged.path.settings
     is_rpy = case.workspace is not None and case.workspace.turns.kind is TurnKind.ROLL_PITCH_YAW
-    size = robot_length(case)
-    box = pose_box(case.workspace) if case.workspace is not None and is_rpy else covered(judged.path, size)[1]
+    is_whole = is_rpy and not settings.names
+    box = (
+        pose_box(case.workspace)
+        if case.workspace is not None and is_whole
+        else covered(judged.path, robot_length(case))[1]
+    )
     turns = [axis_angle_from_matrix(each) for each in poses.rotations]
-    pairs = zip(poses.positions, poses.rotations, turns, strict=True)
-    at = np.array([box.coordinates(PoseNumbers(p, R, *turn)) for p, R, turn in pairs])
+    every = zip(poses.positions, poses.rotations, turns, settings.at(*points), strict=True)
+    at = np.array([box.coordinates(PoseNumbers(p, R, *turn), values) for p, R, turn, values in every])
     try:
         problem = build_problem(case, closed.model, box, at[0])
         robots = RobotsWithinTolerance(case, closed, problem)

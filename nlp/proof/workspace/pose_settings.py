@@ -27,7 +27,10 @@ from ...case.workspace import TurnKind, Turns, Workspace
 from ...errors import CaseError
 from ...interruption import is_requested, one_call, why_stopped, within
 from ...program.layout import Layout
+from ..boxes.tree import TreeRecord, keys_of
+from ..checker.tree import Node, TreeReader, halves
 from ..enclosure.engine import kernel
+from ..statement.chosen_settings import part_of, ranges_of_settings, with_settings
 from ..statement.claims import Claim, claims_of
 from ..statement.fixed_robot import workspace_of_case
 from ..statement.posed_layout import extreme_program, posed_layout, reach_claims_on, without_loops
@@ -68,16 +71,20 @@ class SettingsProof:
         case: the case.
         names: names of the settings.
         outcome: outcome of the claim.
-        boxes: proved boxes; together they are the workspace if the claim is proved.
+        workspace: the workspace.
+        boxes: proved boxes; together they are the workspace if the claim is proved. They are then in the order of the
+            tree.
         pose: pose at which no setting works, if the claim is refuted; middle of an open box if it is open.
         parts: number of parts of the range that were excluded at the pose, for a refuted claim.
         examined: number of examined boxes.
         open: number of open boxes.
         reason: reason for an open outcome; otherwise empty.
+        tree: tree of the cuts of the workspace, as bytes; empty if the claim is not proved.
     """
 
     case: Case
     names: tuple[str, ...]
+    workspace: Workspace
     outcome: Outcome
     boxes: tuple[SettingBox, ...]
     pose: PoseNumbers | None = None
@@ -85,6 +92,7 @@ class SettingsProof:
     examined: int = 0
     open: int = 0
     reason: str = ""
+    tree: bytes = b""
 
     @property
     def is_proved(self) -> bool:
@@ -124,6 +132,7 @@ class _Existence:
             raise CaseError("workspace.position", "must be three coordinates with settings = 'any'", source=case.source)
         self._workspace = case.world_workspace or first
         self._fixed = frozenset(each.index for each in first.dependent)
+        self._tree = TreeRecord()
         closed = closed_form(case.model)
         self._samples = None if closed.model.unknowns or first.dependent else self._sampled(closed)
         self._closed = closed
@@ -164,7 +173,10 @@ class _Existence:
             if progress is not None:
                 progress(len(proved), len(open_boxes))
         if not open_boxes:
-            return self._result(Outcome.PROVED, tuple(proved), None, 0, examined, 0)
+            tree = self._tree.tree(with_open=True)
+            return replace(
+                self._result(Outcome.PROVED, _in_order(tree, proved, self._workspace), None, 0, examined, 0), tree=tree
+            )
         left = pose_box(open_boxes[-1])
         pose = left.pose(0.5 * left.lower + 0.5 * left.upper)
         return self._result(Outcome.OPEN, tuple(proved), pose, 0, examined, len(open_boxes), reason)
@@ -179,7 +191,9 @@ class _Existence:
         left: int,
         reason: str = "",
     ) -> SettingsProof:
-        return SettingsProof(self._case, self._names, outcome, boxes, pose, parts, examined, left, reason)
+        return SettingsProof(
+            self._case, self._names, self._workspace, outcome, boxes, pose, parts, examined, left, reason
+        )
 
     def _values(self, workspace: Workspace) -> tuple[float, ...] | None:
         """Return settings with which every pose of a box is proved; None if those that were tried are not proved."""
@@ -217,16 +231,20 @@ class _Existence:
         if not shares:
             return []
         k = max(shares, key=shares.__getitem__)
-        low, high = ends_of(values[k])
-        middle = low + (high - low) / 2
-        if not low < middle < high:
+        lower, upper = _ends_of(workspace)
+        parts = halves(lower[0], upper[0], k)
+        if not lower[0, k] < parts[0][1][k] < upper[0, k]:
             return []
-        found = []
-        for half in (Free(low, middle), Free(middle, high)):
-            parts = [*values[:k], half, *values[k + 1 :]]
-            angles = tuple(parts[3:])
-            found.append(replace(workspace, position=tuple(parts[:3]), turns=replace(turns, angles=angles)))
-        return found
+        self._tree.cuts(lower, upper, np.array([k]))
+        return [part_of(workspace, (low.tolist(), high.tolist())) for low, high in parts]
+
+
+def _in_order(tree: bytes, boxes: Sequence[SettingBox], whole: Workspace) -> tuple[SettingBox, ...]:
+    """Return boxes in the order of the leaves of a tree."""
+    lower, upper = _ends_of(whole)
+    leaves = TreeReader(tree).walk(lower[0], upper[0], frozenset({Node.CUT}))
+    every = {keys_of(*_ends_of(each.workspace))[0]: each for each in boxes}
+    return tuple(every[keys_of(low[None], high[None])[0]] for _, _, low, high in leaves)
 
 
 class _Samples:
@@ -303,13 +321,7 @@ def _ranges_of(case: Case) -> tuple[tuple[str, ...], tuple[Free, ...]]:
     Raises:
         CaseError: there are more than three settings.
     """
-    names = set() if case.workspace is None else set(case.workspace.setting_names)
-    found = {
-        name: value
-        for item in case.model.parameters
-        for name, value in zip(item.components, case.components(item.name), strict=True)
-        if name in names and isinstance(value, Free)
-    }
+    found = ranges_of_settings(case)
     if len(found) > max(_GRID):
         fault = f"supports at most {max(_GRID)} settings with 'any', and this case has {len(found)}"
         raise CaseError("workspace.settings", fault, source=case.source)
@@ -318,14 +330,13 @@ def _ranges_of(case: Case) -> tuple[tuple[str, ...], tuple[Free, ...]]:
 
 def _with_values(case: Case, names: Sequence[str], values: Sequence[Value]) -> Case:
     """Return a case with other values of its settings."""
-    given = dict(zip(names, values, strict=True))
-    parameters = {
-        item.name: [
-            given.get(name, value) for name, value in zip(item.components, case.components(item.name), strict=True)
-        ]
-        for item in case.model.parameters
-    }
-    return replace(case, parameters=parameters)
+    return with_settings(case, dict(zip(names, values, strict=True)))
+
+
+def _ends_of(workspace: Workspace) -> tuple[FloatArray, FloatArray]:
+    """Return the ends (1, 3 + a) of position and angles of a box."""
+    lower, upper = np.array([ends_of(each) for each in (*workspace.position, *workspace.turns.angles)]).T
+    return lower[None], upper[None]
 
 
 def _excluded(

@@ -152,17 +152,40 @@ def _only(values: FloatArray, index: int | None) -> FloatArray:
     return kept
 
 
-def sliding_maximum(values: FloatArray, reach: int) -> FloatArray:
-    """Return the largest of the values (M,) within some steps to both sides of each value."""
-    size = len(values)
-    reach = min(reach, size)
-    padded = np.concatenate([np.full(reach, _OUT), values, np.full(reach, _OUT)])
+def sliding_maximum(
+    values: FloatArray, reach: int, *, shift: int = 0, size: int | None = None, axis: int = 0
+) -> FloatArray:
+    """Return the largest of the values within some steps to both sides of each place; minus infinity without any.
+
+    Args:
+        values: (M, ...) values along an axis.
+        reach: number of steps to both sides.
+        shift: place of the first result, from the first value.
+        size: number of results; that of the values if left out.
+        axis: the axis.
+    """
+    count = values.shape[axis]
+    size = count if size is None else size
+    # No place is further from a value.
+    reach = min(reach, max(shift + size - 1, count - 1 - shift, 0))
+    begin, length = shift - reach, size + 2 * reach
+    padded = np.full((*values.shape[:axis], length, *values.shape[axis + 1 :]), _OUT)
+    first, last = max(begin, 0), min(begin + length, count)
+    if first < last:
+        padded[_along(axis, first - begin, last - begin)] = values[_along(axis, first, last)]
     width, done = 2 * reach + 1, 1
     while 2 * done <= width:
-        padded = np.maximum(padded[:-done], padded[done:])
+        length = padded.shape[axis]
+        padded = np.maximum(padded[_along(axis, 0, length - done)], padded[_along(axis, done, length)])
         done *= 2
     rest = width - done
-    return padded[:size] if rest == 0 else np.maximum(padded[:size], padded[rest : rest + size])
+    found = padded[_along(axis, 0, size)]
+    return found if rest == 0 else np.maximum(found, padded[_along(axis, rest, rest + size)])
+
+
+def _along(axis: int, begin: int, end: int) -> tuple[slice, ...]:
+    """Return the index of a part of an array along an axis."""
+    return (*[slice(None)] * axis, slice(begin, end))
 
 
 def seeds(
@@ -196,7 +219,10 @@ def _periodic(problem: ScheduleProblem, grid: Grid) -> FloatArray | None:
     if free is None:
         return None
     low, high = sorted(int(np.searchsorted(grid.values, each)) for each in (free[0], free[-1]))
-    tried = np.unique(np.concatenate([np.linspace(low, high, 9), np.linspace(0, len(grid.values) - 1, 16)]).astype(int))
+    tried = np.concatenate(
+        [np.linspace(low, high, 9), np.linspace(0, len(grid.values) - 1, 16), _middle(problem, grid)]
+    )
+    tried = np.unique(tried.astype(int))
     best, most = None, _OUT
     for m in tried.tolist():
         found = best_path(grid, is_worst=problem.is_worst, first=m, last=m)
@@ -207,6 +233,20 @@ def _periodic(problem: ScheduleProblem, grid: Grid) -> FloatArray | None:
         if value > most:
             best, most = found, value
     return best
+
+
+def _middle(problem: ScheduleProblem, grid: Grid) -> list[int]:
+    """Return the grid values at both ends of the second of three rounds; far from its ends a long schedule repeats."""
+    last, rounds = len(grid.stages) - 1, 3
+    long = Grid(
+        np.arange(rounds * last + 1),
+        grid.values,
+        np.concatenate([*[grid.objective[:-1]] * rounds, grid.objective[-1:]]),
+        np.tile(grid.reach, rounds),
+        np.concatenate([*[grid.weights[:-1]] * rounds, grid.weights[-1:]]),
+    )
+    found = best_path(long, is_worst=problem.is_worst)
+    return [] if found is None else np.searchsorted(grid.values, found[[last, 2 * last]]).tolist()
 
 
 def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, most: int = 3) -> list[FloatArray]:

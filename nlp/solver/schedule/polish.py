@@ -56,11 +56,12 @@ def polish(
         level = _search(problem, d, s, constant=constant, near=near, iterations=iterations, goal="level")
         if level is None or constant:
             return level
-        least = level.value - _LOSS * abs(level.value)
+        reached = problem.value(level.d, level.s, estimated=True)
+        least = reached - _LOSS * abs(reached)
         again = _search(
             problem, level.d, level.s, constant=False, near=True, iterations=iterations, goal="", at_least=least
         )
-        return level if again is None or again.value < least - _LOSS * abs(level.value) else again
+        return level if again is None or again.value < level.value - 2 * _LOSS * abs(level.value) else again
     return _search(problem, d, s, constant=constant, near=near, iterations=iterations, goal="")
 
 
@@ -89,7 +90,7 @@ def _search(
     values, limits = problem.function.map(count)(ca.repmat(design, 1, count), S, problem.numbers)
     T = values.shape[0]
     weighted = values * ca.repmat(ca.DM(problem.weights), 1, count)
-    start = problem.combined(problem.at(d, s).objective)
+    start = problem.combined(problem.at(d, s, estimated=True).objective)
     size = float(np.abs(start).mean()) or 1.0
     g, low, high = [ca.vec(limits)], [-math.inf] * limits.numel(), [0.0] * limits.numel()
     if problem.of_design.numel():

@@ -19,8 +19,8 @@ import casadi as ca
 import numpy as np
 from casadi import SX
 
-from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, instantiate
-from ....models.joints.model.closedform import closed_form
+from ....models import Dimension, FloatArray, Model, RobotInstance, Substitution, homogenised, instantiate
+from ....models.joints.model.closedform import closed_form, eliminated_form
 from ....models.rotation import matrix_from_axis_angle
 from ....models.statics import posed_statics
 from ....models.values import dataclass
@@ -29,21 +29,50 @@ from ...case.choices import check_no_catalogue
 from ...case.forces import forces_at
 from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
+from ...case.limits.singular_values import smallest_eigenvalue
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses
-from ...case.task import LEG_LENGTH, Task
+from ...case.task import LEG_LENGTH, SMALLEST, Task
 from ...errors import CaseError
 from ...path.reader import path_without_settings
+from ...path.settings import changing_of
 from ...path.waypoints import Waypoints, waypoints
 from ...program.actuators import signed_values
 from ...program.layout import reference_of
+from ...proof.statement.fixed_robot import check_moving
 
+#: First words of the name of a limb's reach among the limits.
+REACH = "reach limb "
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
 #: Rounding of a difference of two settings, relative to the largest setting.
 _ROUNDING = 2.0**-50
+#: Largest residual of closed loops, which have magnitudes of about 1. At the edge of the reach it is as large as the
+#: excess over a limit that counts as rounding.
+_CLOSED = 1e-6
+#: Number of designs and settings at which loops are tested along the path.
+_TESTED, _SEED = 12, 0
+
+
+class _Stated(NamedTuple):
+    """Constraint of the case at one point: name, expression with its bounds, reading, and whether it is no estimate."""
+
+    name: str
+    expression: SX
+    lower: float
+    upper: float
+    reading: Reading
+    is_exact: bool = True
+
+
+class _Row(NamedTuple):
+    """One side of a constraint: name, excess relative to the size of the bound, and whether it is no estimate."""
+
+    name: str
+    excess: SX
+    is_exact: bool
 
 
 class Variable(NamedTuple):
@@ -89,7 +118,10 @@ class ScheduleProblem:
         objective: (T, 1) signed objectives.
         limits: (c, 1) limits as expressions that must be at most 0.
         of_design: (b, 1) limits of the design alone, at most 0.
+        loops: (e, 1) left sides of the loop equations, scaled to values of about 1; 0 at poses that the robot can take.
         names: names of the limits.
+        are_exact: (c,) whether each limit is on the quantity of the case; false for a limit on a stricter estimate.
+        matrix: (m, 6) homogenised J, if its smallest singular value is the objective; otherwise None.
         margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
     """
 
@@ -102,7 +134,10 @@ class ScheduleProblem:
     objective: SX
     limits: SX
     of_design: SX
+    loops: SX
     names: tuple[str, ...]
+    are_exact: tuple[bool, ...]
+    matrix: SX | None = None
     margins: FloatArray | None = None
 
     @property
@@ -118,7 +153,7 @@ class ScheduleProblem:
     @property
     def has_levels(self) -> bool:
         """True if the value of a point is the worst of its objectives: quantities of legs or actuators."""
-        return bool(self.case.tasks[0].measure)
+        return bool(self.case.tasks[0].measure) and self.matrix is None
 
     @property
     def is_periodic(self) -> bool:
@@ -148,13 +183,52 @@ class ScheduleProblem:
         """Function of design, settings and the numbers of a point, with objectives and limits."""
         return ca.Function("point", list(self.symbols), [ca.densify(self.objective), ca.densify(self.limits)])
 
-    def at(self, d: FloatArray, s: FloatArray, which: Sequence[int] | None = None) -> Values:
-        """Return the values for a design (n,) and settings (N, k) at the points, or at some of the points."""
+    @cached_property
+    def matrix_function(self) -> ca.Function | None:
+        """Function of design, settings and the numbers of a point, with the homogenised J (m, 6); None without it."""
+        if self.matrix is None:
+            return None
+        return ca.Function("matrix", list(self.symbols), [ca.densify(self.matrix)])
+
+    def matrices(self, d: FloatArray, s: FloatArray, numbers: FloatArray) -> FloatArray | None:
+        """Return the homogenised J (N, m, 6) for a design (n,) and settings (N, k) at points with numbers (16, N)."""
+        if self.matrix_function is None or self.matrix is None:
+            return None
+        count = numbers.shape[1]
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        rows, columns = self.matrix.shape
+        found = self.matrix_function.map(count)(design, np.reshape(s, (count, -1)).T, numbers).full()
+        return np.asarray(found.reshape(rows, count, columns).transpose(1, 0, 2))
+
+    def at(
+        self, d: FloatArray, s: FloatArray, which: Sequence[int] | None = None, *, estimated: bool = False
+    ) -> Values:
+        """Return the values for a design (n,) and settings (N, k) at the points, or at some of the points.
+
+        Args:
+            d: (n,) design.
+            s: (N, k) settings.
+            which: indices of the points; all if left out.
+            estimated: If true, the smallest singular value is the smooth estimate of the program, not above it.
+        """
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
         design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
         objective, limits = self.function.map(count)(design, np.reshape(s, (count, -1)).T, numbers)
-        return Values(objective.full().T, limits.full().T)
+        values, matrices = objective.full().T, None if estimated else self.matrices(d, s, numbers)
+        if matrices is not None:
+            regular = np.isfinite(matrices).all(axis=(1, 2))
+            values = np.full((count, 1), math.nan)
+            values[regular] = np.linalg.svd(matrices[regular], compute_uv=False)[:, -1:]
+        return Values(values, limits.full().T)
+
+    def gaps(self, d: FloatArray, s: FloatArray) -> FloatArray:
+        """Return the largest residual (N,) of the loop equations at the points, for a design (n,) and settings."""
+        function = ca.Function("loops", list(self.symbols), [ca.densify(self.loops)])
+        count = len(self.points)
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        found = function.map(count)(design, np.reshape(s, (count, -1)).T, self.numbers)
+        return np.asarray(np.abs(found.full()).max(axis=0, initial=0.0))
 
     def combined(self, objective: FloatArray) -> FloatArray:
         """Return the value of each point from its objectives (..., T): their sum, or the worst."""
@@ -162,9 +236,9 @@ class ScheduleProblem:
         is_worst = self.is_worst or self.has_levels
         return np.asarray(weighted.min(axis=-1) if is_worst else weighted.sum(axis=-1))
 
-    def value(self, d: FloatArray, s: FloatArray) -> float:
-        """Return the signed objective of a design (n,) and a schedule (N, k)."""
-        per_point = self.combined(self.at(d, s).objective)
+    def value(self, d: FloatArray, s: FloatArray, *, estimated: bool = False) -> float:
+        """Return the signed objective of a design (n,) and a schedule (N, k); see :meth:`at`."""
+        per_point = self.combined(self.at(d, s, estimated=estimated).objective)
         return float(per_point.min()) if self.is_worst else math.fsum((self.points.weights * per_point).tolist())
 
     def is_feasible(self, d: FloatArray, s: FloatArray, slack: float = 1e-7) -> bool:
@@ -179,6 +253,7 @@ class ScheduleProblem:
         return bool(
             np.isfinite(values.objective).all()
             and (values.excess <= slack).all()
+            and (self.gaps(d, s) <= _CLOSED).all()
             and (own <= slack).all()
             and (s >= low - rounding).all()
             and (s <= high + rounding).all()
@@ -206,14 +281,17 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     """
     check_no_catalogue(case)
     case.require_motion()
+    if case.limits_over:
+        check_moving(case, tuple(changing_of(case).own.values()))
     points = waypoints(path_without_settings(case))
     _check_times(case, points)
     closed = closed_form(case.model)
+    if closed.model.unknowns:
+        closed = eliminated_form(case.model)
     model = closed.model
     if model.unknowns:
-        fault = (
-            f"is not supported along a path: joints of {case.model.name!r} do not follow from the pose in closed form"
-        )
+        names = ", ".join(each.description or each.name for each in model.unknowns)
+        fault = f"is not supported along a path for {case.model.name!r}: no closed form of {names}"
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
@@ -231,18 +309,21 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     length = SX(case.characteristic_length)
     robot = instantiate(model, substitution, length, twists)
     stated = [
-        (item.constraint.name, item.constraint.expression, item.lower, item.upper, item.constraint.reading)
+        _Stated(item.constraint.name, item.constraint.expression, item.lower, item.upper, item.constraint.reading,
+                is_exact=item.constraint.spectral is None)
         for item in _limits(case, robot, parameters)
-    ]
+    ]  # fmt: skip
     for reach in closed.reaches:
         value = ca.Function("reach", Substitution.identity(model).all, [reach.value]).call(substitution.all)[0]
-        stated.append((f"reach limb {reach.limb}", value, 0.0, math.inf, NUMBER))
-    rows = [row for each in stated for row in _rows(*each, case.characteristic_length)]
-    varying = [bool(ca.depends_on(row, ca.vertcat(s, point))) for _, row in rows]
+        stated.append(_Stated(f"{REACH}{reach.limb}", value, 0.0, math.inf, NUMBER))
+    rows = [row for each in stated for row in _rows(each, case.characteristic_length)]
+    rows = [row for row in rows if not _is_bound(row.excess, d, s, [*design, *settings])]
+    varying = [bool(ca.depends_on(row.excess, ca.vertcat(s, point))) for row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
-    values = _values(case, model, robot)
+    matrix = _matrix(case, robot)
+    values = _values(case, model, robot) if matrix is None else ca.sqrt(smallest_eigenvalue(matrix.T @ matrix))
     weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
-    return ScheduleProblem(
+    problem = ScheduleProblem(
         case=case,
         points=points,
         design=design,
@@ -250,10 +331,39 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         weights=np.array(weights),
         symbols=(d, s, point),
         objective=case.tasks[0].sense.sign * values,
-        limits=ca.vertcat(SX(0, 1), *[row + point[15] for _, row in at_points]),
-        of_design=ca.vertcat(SX(0, 1), *[row for (_, row), own in zip(rows, varying, strict=True) if not own]),
-        names=tuple(name for name, _ in at_points),
+        limits=ca.vertcat(SX(0, 1), *[row.excess + point[15] for row in at_points]),
+        of_design=ca.vertcat(SX(0, 1), *[row.excess for row, own in zip(rows, varying, strict=True) if not own]),
+        loops=robot.loops if model.loops else robot.closure,
+        names=tuple(row.name for row in at_points),
+        are_exact=tuple(row.is_exact for row in at_points),
+        matrix=matrix,
     )
+    _check_poses(problem)
+    return problem
+
+
+def _check_poses(problem: ScheduleProblem) -> None:
+    """Refuse a path with a pose that the robot takes with no tested design and settings within its reach.
+
+    Raises:
+        CaseError: the loop equations exclude a pose.
+    """
+    count, (low, high, first) = len(problem.points), ends([*problem.design, *problem.settings])
+    if not problem.loops.numel():
+        return
+    rng, n = np.random.default_rng(_SEED), len(problem.design)
+    reach = [k for k, name in enumerate(problem.names) if name.startswith(REACH)]
+    least, within = np.full(count, math.inf), np.zeros(count, dtype=bool)
+    for values in (first, *(rng.uniform(low, high) for _ in range(_TESTED))):
+        d, s = values[:n], np.repeat(values[None, n:], count, axis=0)
+        is_within = (problem.at(d, s).excess[:, reach] <= 0).all(axis=1)
+        least[is_within] = np.minimum(least, problem.gaps(d, s))[is_within]
+        within |= is_within
+    wrong = np.flatnonzero(within & ~(least <= _CLOSED))
+    if len(wrong):
+        x, y, z = problem.points.positions[wrong[0]].tolist()
+        fault = f"{problem.case.model.name!r} cannot take the pose at ({x:.7g}, {y:.7g}, {z:.7g}): its joints constrain"
+        raise CaseError("path.file", f"{fault} the platform to other poses", source=problem.case.source)
 
 
 def _check_times(case: Case, points: Waypoints) -> None:
@@ -325,6 +435,22 @@ def _values(case: Case, model: Model, robot: RobotInstance) -> SX:
     return ca.vertcat(*[each.value for each in signed_values(case, forces)])
 
 
+def _matrix(case: Case, robot: RobotInstance) -> SX | None:
+    """Return the homogenised J (m, 6) at a point, if its smallest singular value is the objective; otherwise None.
+
+    Raises:
+        CaseError: J has fewer than six rows, so its smallest singular value is 0.
+    """
+    task = case.tasks[0]
+    if task.measure != SMALLEST or task.length is None:
+        return None
+    found = ca.horzcat(*homogenised(robot.jacobian, robot.position, task.length))
+    if found.shape[0] < found.shape[1]:
+        fault = f"is 0 for {case.model.name!r}: its J has {found.shape[0]} rows, fewer than six"
+        raise CaseError(task.objective_key, fault, task.measure, case.source)
+    return found
+
+
 def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedConstraint]:
     """Return the limits of a case at one point."""
     stated = [*case.position, case.rotation.angle]
@@ -345,11 +471,31 @@ def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedCon
     return found
 
 
-def _rows(
-    name: str, expression: SX, lower: float, upper: float, reading: Reading, length: float
-) -> Iterator[tuple[str, SX]]:
-    """Yield one-sided rows ``row <= 0`` of a constraint, relative to the size of the bound."""
+def _rows(stated: _Stated, length: float) -> Iterator[_Row]:
+    """Yield the sides of a constraint, with the characteristic length of the robot."""
+    name, expression, lower, upper, reading, is_exact = stated
     if math.isfinite(upper):
-        yield name, (expression - upper) / reading.size(upper, length)
+        yield _Row(name, (expression - upper) / reading.size(upper, length), is_exact)
     if math.isfinite(lower):
-        yield name, (lower - expression) / reading.size(lower, length)
+        yield _Row(name, (lower - expression) / reading.size(lower, length), is_exact)
+
+
+def _is_bound(row: SX, d: SX, s: SX, variables: Sequence[Variable]) -> bool:
+    """Return whether a row ``row <= 0`` holds within the range of its only variable, as the limit on a joint does.
+
+    Args:
+        row: (1, 1) row.
+        d: (n, 1) symbols of the design.
+        s: (k, 1) symbols of the settings.
+        variables: variables of both.
+    """
+    symbols = ca.vertcat(d, s)
+    own = ca.symvar(row)
+    hashes = [each.element_hash() for each in ca.vertsplit(symbols)] if symbols.numel() else []
+    if len(own) != 1 or own[0].element_hash() not in hashes:
+        return False
+    variable = variables[hashes.index(own[0].element_hash())]
+    if ca.depends_on(ca.jacobian(row, own[0]), own[0]):
+        return False
+    ends_of_row = ca.Function("row", own, [row]).map(2)([variable.lower, variable.upper]).full()
+    return bool((ends_of_row <= _ROUNDING).all())

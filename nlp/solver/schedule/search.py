@@ -6,6 +6,7 @@ there. The best one is searched once more on a finer grid.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,8 +20,8 @@ from ...case.case import Case
 from ...case.pathfile import TURN
 from ...case.pose import Free, OverPoses, Rotation
 from ...case.settings import Search
-from ...case.task import Sense, Task
-from ...interruption import is_requested
+from ...case.task import Method, Sense, Task
+from ...interruption import Milestone, is_requested, reached
 from ...path.path import Poses
 from ...program.formulation import formulate
 from ..compromise import solution_of_one_task
@@ -28,7 +29,7 @@ from ..multistart import solve_program
 from ..scheduled import ConstantSetting, Schedule
 from ..solution import Solution
 from ..status import Status
-from .cells import cell_bound, check_certified
+from .cells import CellBound, cell_bound, check_certified
 from .dynamic import constants, seeds
 from .exchange import ProvedSchedule, exchanged
 from .polish import Polished, polish
@@ -61,7 +62,7 @@ def solve_schedule(
         progress: function to call after each design.
 
     Raises:
-        CaseError: the case is not supported along a path, or the bound has more than one setting.
+        CaseError: the case is not supported along a path, or the bound has more than two settings.
         InputError: the path cannot be read.
     """
     began = time.perf_counter()
@@ -93,7 +94,8 @@ def solve_schedule(
     proved = exchanged(problem, best) if case.limits_over else None
     if proved is not None:
         best = _at_stated_points(problem, proved)
-    bound = None if gap is None else cell_bound(problem, best.d, best.value, gap).bound
+    reached(Milestone.START)
+    bound = None if gap is None else cell_bound(problem, best.d, best.value, gap)
     return _solution(problem, best, constant, bound, began, search, proved)
 
 
@@ -140,7 +142,7 @@ def _solution(
     problem: ScheduleProblem,
     best: Polished | None,
     constant: Polished | None,
-    bound: float | None,
+    bound: CellBound | None,
     began: float,
     search: Search,
     proved: ProvedSchedule | None = None,
@@ -148,7 +150,8 @@ def _solution(
     """Return the solution: the robot at the first point of the path, with its schedule."""
     case, sign = problem.case, problem.sign
     d, s = (ends(problem.design)[2], ends(problem.settings)[2]) if best is None else (best.d, best.s[0])
-    start = at_first_point(problem, d, s)
+    start = at_point(problem, d, s)
+    start = replace(start, tasks=start.tasks[:1], method=Case.method)
     own = solve_program(formulate(start), replace(search, starts=1), jobs=1)
     # That no schedule was found does not prove that none exists.
     status = Status.NOT_CONVERGED if best is None else Status.LOCAL
@@ -161,7 +164,9 @@ def _solution(
         return found
     units = case.units
     unit = np.array([units.shown(1.0, each.dimension) for each in problem.settings])
-    held = None if constant is None else ConstantSetting(constant.s[0] * unit, sign * constant.value)
+    held = None
+    if constant is not None:
+        held = ConstantSetting(constant.s[0] * unit, sign * constant.value, _shown_design(problem, constant.d))
     # Rows at the further points keep the limits between the points of the problem.
     shown, rows = (problem, best) if proved is None else (proved.problem, proved.schedule)
     schedule = Schedule(
@@ -171,31 +176,40 @@ def _solution(
         values=rows.s * unit,
         times=shown.points.times,
         poses=Poses(shown.points.positions, shown.points.rotations),
+        feeds=shown.points.feeds,
         F=sign * shown.combined(shown.at(rows.d, rows.s).objective),
         over=case.over_path or OverPoses.MEAN,
         value=sign * best.value,
         constant=held,
         rates=np.array([each.rate for each in problem.settings], dtype=np.float64) * unit,
-        design={
-            each.name: units.shown(value, each.dimension)
-            for each, value in zip(problem.design, best.d.tolist(), strict=True)
-        },
-        bound=None if bound is None else sign * bound,
+        design=_shown_design(problem, best.d),
+        bound=None if bound is None or not math.isfinite(bound.bound) else sign * bound.bound,
+        reason="" if bound is None else bound.reason,
         sign=sign,
         seconds=seconds,
         judgement=None if proved is None else proved.judgement,
         added=0 if proved is None else proved.added,
+        is_home_mode=bool(case.model.unknowns),
     )
     return replace(found, schedule=schedule)
 
 
-def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Case:
-    """Return the case of the robot at the first point of the path: fixed design, setting, pose and motion.
+def _shown_design(problem: ScheduleProblem, d: FloatArray) -> dict[str, float]:
+    """Return the values of a design (n,) in the case's units, by name."""
+    named = zip(problem.design, d.tolist(), strict=True)
+    return {each.name: problem.case.units.shown(value, each.dimension) for each, value in named}
+
+
+def at_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray, index: int = 0) -> Case:
+    """Return the case of the robot at one point of the path: fixed design, settings, pose and motions.
+
+    Several motions are combined by a weighted sum, as those of one point are.
 
     Args:
         problem: the problem.
         d: (n,) design.
         s: (k,) settings at the point.
+        index: index of the point.
     """
     case, points = problem.case, problem.points
     values = {
@@ -208,30 +222,31 @@ def at_first_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Ca
         ]
         for item in case.model.parameters
     }
-    rotation, axis = points.rotations[0], np.array([0.0, 0.0, 1.0])
+    rotation, axis = points.rotations[index], np.array([0.0, 0.0, 1.0])
     if case.path is not None and case.path.tool is not None:
         local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
         turn = case.path.tool.turn
         axis = rotation @ local
         rotation = rotation @ rotation_matrix(local * (values[TURN] if isinstance(turn, Free) else float(turn)))
-    task = case.tasks[0]
-    p = points.positions[0]
+    p = points.positions[index]
     twists = {
-        "feed": (0.0, 0.0, 0.0, *points.feeds[0]),
+        "feed": (0.0, 0.0, 0.0, *points.feeds[index]),
         "thrust": (0.0, 0.0, 0.0, *axis),
         "tool": (*axis, *np.cross(p, axis)),
     }
-    if task.measure:
-        task = Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False)
-    elif task.follows:
-        task = replace(task, twist=twists[task.follows], follows="")
+    tasks: list[Task] = []
+    for task in case.tasks:
+        if task.measure:
+            tasks.append(Task((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), Sense.MIN, task.name, is_stated=False))
+        else:
+            tasks.append(replace(task, twist=twists[task.follows], follows="") if task.follows else task)
     return replace(
         case,
         parameters=parameters,
         position=tuple(p.tolist()),
         rotation=Rotation(*axis_angle_from_matrix(rotation)),
-        tasks=(task,),
+        tasks=tuple(tasks),
         path=None,
         over_path=None,
-        method=Case.method,
+        method=Method.WEIGHTED_SUM if len(tasks) > 1 else Case.method,
     )

@@ -7,7 +7,9 @@
  */
 const documentOf = (page) => {
   const host = /** @type {HTMLElement} */ (page.getElementById("live"));
+  // From here on the page does not show the content of the host: the picture for pages without a script.
   const root = host.attachShadow({ mode: "open" });
+  page.documentElement.classList.add("embedded");
   root.append(/** @type {HTMLTemplateElement} */ (page.getElementById("live-markup")).content);
   return {
     documentElement: host,

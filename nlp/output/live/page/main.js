@@ -2,7 +2,7 @@
 import { CaseModule } from "./module.js";
 import { measuredSide } from "./limits.js";
 import { State } from "./state.js";
-import { argumentsOf, caseFileOf, fragmentOf, takeFragment } from "./text.js";
+import { argumentsOf, caseFileOf, fragmentOf, takeFragment, unpack } from "./text.js";
 import { axesOf, colourOf, conesOf, extentOf, piecesOf, robotOf } from "./scene.js";
 import { Picture } from "./canvas.js";
 import { Sliders, byId, make, showValues } from "./panel.js";
@@ -13,12 +13,6 @@ import { ValueMap } from "./map.js";
 import { Player } from "./play.js";
 import { Track } from "./track.js";
 import { plus } from "./numbers.js";
-
-/** Bytes from base64, unpacked. @param {string} text */
-const unpack = (text) => {
-  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
-};
 
 const data = JSON.parse(byId("data").textContent ?? "{}");
 /** @type {State | null} */
@@ -70,7 +64,7 @@ const draw = () => {
   const p = state ? state.module.arrays.p : data.p;
   const coloured = Number(/** @type {HTMLSelectElement} */ (byId("colour")).value.startsWith("rate") ? /** @type {HTMLSelectElement} */ (byId("colour")).value.split(" ")[1] : 0);
   const task = data.pose_tasks[state?.pose ?? 0] ?? coloured;
-  const twist = data.is_stated && !track ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
+  const twist = data.is_stated && (!track || track.schedule) ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
   if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];
   const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist, cones: conesOf(view, data, coneLimit) });
@@ -91,7 +85,7 @@ const show = () => {
   if (state) {
     sliders?.refresh();
     fields?.refresh();
-    showValues(state, bars?.refresh() ?? []);
+    showValues(state, bars?.refresh() ?? [], track?.schedule?.headline() ?? null);
     showActuators(state);
     map?.refresh();
     track?.refresh();
@@ -191,9 +185,12 @@ const listen = () => {
   }));
   on("copy-set", () => copy(`screwsynth evaluate ${data.command} ${argumentsOf(live())}`, "Command"));
   on("copy-case", () => copy(caseFileOf(live()), "Case file"));
-  on("copy-link", () => copy(`${location.href.split("#")[0]}${fragmentOf(live())}`, "Link"));
-  byId("copy-case").hidden = !data.case_parts;
-  globalThis.addEventListener("hashchange", () => change(() => takeFragment(live(), location.hash)));
+  on("copy-link", () => copy(`${location.href.split("#")[0]}${track?.schedule?.fragment() ?? fragmentOf(live())}`, "Link"));
+  byId("copy-case").hidden = !data.case_parts.length;
+  globalThis.addEventListener("hashchange", () => change(() => {
+    takeFragment(live(), location.hash);
+    track?.take(location.hash);
+  }));
 };
 
 byId("colour").addEventListener("change", draw);
@@ -220,7 +217,7 @@ poseChoice?.addEventListener("change", () => change(() => {
 }));
 
 // Texts that the program wrote get the minus signs of the page.
-for (const each of document.querySelectorAll("#stated-task p, #F")) each.textContent = (each.textContent ?? "").replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
+for (const each of document.querySelectorAll("#stated-task p, #F, #task-values li")) each.textContent = (each.textContent ?? "").replace(/(^|[\s(,=])-(?=[\d.])/g, "$1\u2212");
 document.documentElement.classList.toggle("still", !data.has_module);
 show();
 if (data.has_module) {
@@ -235,7 +232,8 @@ if (data.has_module) {
   player = new Player(state, data, change);
   listen();
   if (data.track) {
-    track = new Track(state, data.track, change, globalThis.document);
+    track = new Track(state, data.track, change, copy);
+    track.take(location.hash);
     // The pose is that of the path, and the picture contains the path.
     picture.grab = null;
     picture.fitted = [];

@@ -23,7 +23,7 @@ const SIDE = 582;
 const SHADES = [[33, 47, 94], [43, 98, 140], [60, 147, 148], [140, 190, 120], [250, 226, 110]];
 
 /** Colour of a part between 0 and 1. @param {number} part */
-const shade = (part) => {
+export const shade = (part) => {
   const at = Math.max(0, Math.min(1, part)) * 4, low = Math.min(3, Math.floor(at)), share = at - low;
   return SHADES[low].map((each, k) => Math.round(each + share * (SHADES[low + 1][k] - each)));
 };

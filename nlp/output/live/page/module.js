@@ -69,6 +69,11 @@ export class CaseModule {
     return this.exports.close_loops(moved, withPoses ? 1 : 0) === 0;
   }
 
+  /** Smallest singular value of J at the last evaluated pose. @param {number} length length by which moments are divided */
+  smallestSingularValue(length) {
+    return this.exports.smallest_singular_value(length);
+  }
+
   /** Rank of J at the last evaluated pose. */
   rank() {
     return this.exports.rank();

@@ -113,19 +113,36 @@ export class Sliders {
   }
 }
 
-/** Headline, and the values of the point. @param {State} state @param {import("./limits.js").LimitState[]} limits */
-export const showValues = (state, limits) => {
+/** F of each of several tasks as a part of its separate optimum, in the words of `page.py`. @param {State} state */
+const showTasks = (state) => {
+  const list = byId("task-values"), values = state.taskValues();
+  list.hidden = !values.length;
+  values.forEach(({ F, best }, k) => {
+    const { name, sense, F_unit } = state.data.tasks[k], row = list.children[k] ?? list.appendChild(make("li", {}));
+    const part = best ? `${digits((100 * F) / best, 4)} % of ` : "";
+    say(row, `${name}: F = ${measured(F, F_unit)}${best === null ? "" : `, ${part}the separate ${sense}imum ${digits(best)}`}`);
+  });
+};
+
+/**
+ * Headline, and the values of the point.
+ * @param {State} state
+ * @param {import("./limits.js").LimitState[]} limits
+ * @param {import("./schedule.js").Headline | null} own headline of a schedule; null for that of the state
+ */
+export const showValues = (state, limits, own) => {
   const { data, module } = state, { singular_values } = module.arrays;
-  const { word, words, isFault } = state.headline();
+  const { word, words, isFault } = own ?? state.headline();
   const violated = limits.filter((each) => each.isViolated).length;
   const value = state.shownF();
   const extreme = state.kind === "program" && data.tasks.length === 1 ? (data.sense === "max" ? "largest " : "smallest ") : "";
-  say(byId("F"), `${extreme}${data.F_name} = ${measured(value, data.F_unit)}`);
+  say(byId("F"), own?.value ?? `${extreme}${data.F_name} = ${measured(value, data.F_unit)}`);
   say(byId("word"), word);
   say(byId("words"), words + (violated ? `; ${violated} limit${violated > 1 ? "s" : ""} violated` : ""));
+  showTasks(state);
   byId("answer").classList.toggle("none", isFault || violated > 0);
-  byId("answer").classList.toggle("proved", state.kind === "program");
-  byId("stated-task").hidden = state.hasOtherTask();
+  byId("answer").classList.toggle("proved", own ? own.isProgram : state.kind === "program");
+  byId("stated-task").hidden = !own && state.hasOtherTask();
   const rank = module.rank();
   say(byId("rank"), `${rank}${rank < 6 ? " (singular)" : ""}`);
   say(byId("singular"), digits(settled(singular_values[5], singular_values[0]), 5));

@@ -41,6 +41,8 @@ export class State {
     this.status = 0;
     this.fault = 0;
     this.seconds = 0;
+    /** @type {{ F: number, size: number }[]} F of each task, and the size of its terms */
+    this.taskSums = [];
     this.inner = new Set(data.inner);
     this.low = module.arrays.case_lower.slice();
     this.high = module.arrays.case_upper.slice();
@@ -241,9 +243,8 @@ export class State {
 
   /** Whether everything is as in the program's answer, which is an optimum. */
   isProgram() {
-    const { answer, p } = this.data, { arrays } = this.module;
-    const isSame = this.limits.every((each, k) => arrays.limits[k] === each.value);
-    return Boolean(answer?.isOptimum) && !this.held.size && isSame && arrays.p.every((each, k) => each === p[k]) && this.isNear(answer.x, arrays.x);
+    const { answer } = this.data;
+    return Boolean(answer?.isOptimum) && !this.held.size && this.isStatedCase() && this.isNear(answer.x, this.module.arrays.x);
   }
 
   /** @param {number} status */
@@ -346,7 +347,44 @@ export class State {
 
   /** Evaluates everything that is shown. */
   look() {
+    const { poses, tasks } = this.data;
+    this.taskSums = tasks.map(() => ({ F: 0, size: 0 }));
+    // The module has the robot of one pose: F of one of several tasks needs all its poses, and the shown one comes last.
+    for (let pose = 0; pose < poses && tasks.length > 1; pose += 1) {
+      if (pose === this.pose) continue;
+      this.module.evaluate(pose, false);
+      this.addPose(pose);
+    }
     this.fault = this.module.evaluate(this.pose, true).fault;
+    this.addPose(this.pose);
+  }
+
+  /** Adds F at the evaluated pose to that of its tasks. @param {number} pose */
+  addPose(pose) {
+    const { blocks, pose_tasks } = this.data, { view } = this.module.arrays;
+    this.taskSums.forEach((sum, task) => {
+      if (pose_tasks.length && pose_tasks[pose] !== task) return;
+      const k = pose_tasks.length ? 0 : task;
+      sum.F += view[blocks.F[0] + k];
+      sum.size += view[blocks.magnitude[0] + k];
+    });
+  }
+
+  /** F of each of several tasks over its poses, and its separate optimum in the case as it is, null where it is not known. @returns {{ F: number, best: number | null }[]} */
+  taskValues() {
+    const { tasks, poses, pose_tasks, is_mean, answer } = this.data, count = pose_tasks.length ? poses / tasks.length : poses;
+    if (tasks.length < 2) return [];
+    const isKnown = this.isStatedCase(tasks.map((/** @type {{ weight: number }} */ each) => each.weight));
+    return this.taskSums.map(({ F, size }, k) => {
+      const value = Math.abs(F) <= ZERO_F * size ? 0 : F;
+      return { F: is_mean ? value / count : value, best: isKnown ? (answer?.optima[k] ?? null) : null };
+    });
+  }
+
+  /** Whether limits and fixed values are those of the case. @param {number[]} [besides] indices in p that may differ */
+  isStatedCase(besides = []) {
+    const { arrays } = this.module;
+    return this.limits.every((each, k) => arrays.limits[k] === each.value) && arrays.p.every((each, k) => each === this.data.p[k] || besides.includes(k));
   }
 
   /**

@@ -5,6 +5,12 @@
  * @typedef {import("./state.js").Slider} Slider
  */
 
+/** Bytes from base64, unpacked. @param {string} text */
+export const unpack = (text) => {
+  const bytes = Uint8Array.from(atob(text), (sign) => sign.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+};
+
 /** Axis and angle in the case's unit of each rotation with a free axis. @param {State} state */
 export const rotationsOf = (state) => {
   const factor = state.data.units.angle === "deg" ? 180 / Math.PI : 1;

@@ -161,6 +161,25 @@
     }, 700);
   }
 
+  // Numbers of a column are aligned at the decimal point, as tables.py does it: digits before it have one width.
+  /** @param {string} name @param {string[]} texts */
+  function writeColumn(name, texts) {
+    const SIGN = 1.35, parts = texts.map((each) => /^([+\u2212]?)(\d+)(.*)$/.exec(each));
+    const width = Math.max(0, ...parts.map((each) => (each ? each[2].length : 0))) + (parts.some((each) => each && each[1]) ? SIGN : 0);
+    document.querySelectorAll(`#rates tbody .${name}`).forEach((cell, k) => {
+      const found = parts[k];
+      if (!found) {
+        cell.textContent = texts[k];
+        return;
+      }
+      const head = document.createElement("span");
+      head.className = "w";
+      head.style.setProperty("--w", String(width));
+      head.textContent = found[1] + found[2];
+      cell.replaceChildren(head, found[3]);
+    });
+  }
+
   function tell() {
     const frame = view.frames[index];
     if (byId("travel")) {
@@ -171,13 +190,12 @@
     if (!byId("rates")) return;
     byId("where").textContent = frame.words;
     byId("F-there").textContent = `${shown(frame.F, 7)} ${view.objective_unit}`.trim();
+    const { rates, lengths } = frame;
+    writeColumn("length", lengths.map((each) => (each === null ? "" : shown(each, 5))));
+    writeColumn("rate", rates.map((each) => shown(each, 6, true)));
+    writeColumn("share", rates.map((each) => (frame.F > 0 ? `${(100 * each * each / frame.F).toFixed(1)} %` : "none")));
     document.querySelectorAll("#rates tbody tr").forEach((row, k) => {
-      const rate = frame.rates[k], length = frame.lengths[k];
-      const cell = (/** @type {string} */ name) => /** @type {HTMLElement} */ (row.querySelector(`.${name}`));
-      cell("length").textContent = length === null ? "" : shown(length, 5);
-      cell("rate").textContent = shown(rate, 6, true);
-      cell("share").textContent = frame.F > 0 ? `${(100 * rate * rate / frame.F).toFixed(1)} %` : "none";
-      const bar = cell("bar");
+      const rate = rates[k], bar = /** @type {HTMLElement} */ (row.querySelector(".bar"));
       bar.classList.toggle("minus", rate < 0);
       bar.style.setProperty("--part", (Math.abs(rate) / largest()).toFixed(4));
     });

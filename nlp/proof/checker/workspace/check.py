@@ -25,7 +25,7 @@ from ....errors import InputError, UncoveredError
 from ....path.path import ProgrammedPath
 from ....program.layout import Layout
 from ...statement.claims import ERRORS, REACH, Claim, ClaimKind
-from ...statement.fixed_robot import Legs, check_leg_error, workspace_of_case
+from ...statement.fixed_robot import Legs, check_leg_error, legs_of, workspace_of_case
 from ...statement.motors import actuator_coordinates, in_path_motion
 from ...statement.posed_layout import extreme_program
 from ...statement.tolerance import Directions, length_of_one_robot, second_order_name
@@ -65,7 +65,7 @@ from .statement import (
 _ROUNDING = 1e-15
 #: Fraction of a limit by which a bound may exceed the limit and still count as equal, because of rounding in the
 #: search.
-_ON_LIMIT = 1e-9
+ON_LIMIT = 1e-9
 #: Names of the pose errors; a proof states bounds of their first-order parts.
 _FIRSTS = tuple(each.name for each in ERRORS)
 #: Reasons of claims about a path.
@@ -73,7 +73,7 @@ _ALONG_PATH = ("regular", "singular", "boxes", "lengths")
 #: Beginning of the message for a kind of proof that does not fit a claim.
 _WRONG_REASON = "a claim of this kind cannot be proved by the reason"
 #: A tree with a single leaf.
-_WHOLE = bytes([Node.BOUNDED])
+WHOLE = bytes([Node.BOUNDED])
 #: Message about a proof with displaced joint centres of a claim about the nominal robot.
 _WITHOUT_TOLERANCE = "the proof is for robots within a joint-centre tolerance, but the case has no tolerance"
 
@@ -134,7 +134,7 @@ def check_workspace_proof(proof: Proof, case: Case, *, leg_error: float = 0.0) -
         InputError: the leg error is negative, or the robot does not have six straight legs.
     """
     check_leg_error(case, leg_error)
-    return _check(proof, lambda: _Checker(proof, case, leg_error))
+    return _check(proof, lambda: WorkspaceChecker(proof, case, leg_error))
 
 
 def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> VerifiedWorkspace:
@@ -153,7 +153,7 @@ def check_path_proof(proof: Proof, case: Case, path: ProgrammedPath) -> Verified
     return _check(proof, lambda: _PathChecker(proof, case, path))
 
 
-def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
+def _check(proof: Proof, begun: Callable[[], WorkspaceChecker]) -> VerifiedWorkspace:
     """Check all claims of a proof, with a checker that ``begun`` creates."""
     if not proof.claims:
         raise ProofError("the proof has no claims")
@@ -178,7 +178,7 @@ def _check(proof: Proof, begun: Callable[[], _Checker]) -> VerifiedWorkspace:
     return VerifiedWorkspace(tuple(claims), checker.robot.numbers_at, checker.workspace, checker.leaves, checker.pieces)
 
 
-class _Checker:
+class WorkspaceChecker:
     """Check of claims one after another; later claims use the bounds of earlier claims."""
 
     def __init__(self, proof: Proof, case: Case, leg_error: float) -> None:
@@ -232,7 +232,7 @@ class _Checker:
         bound, limit, read = rules[each.kind, given.reason](each, given), each.limit, each.reading.from_value
         if limit is not None:
             beyond = bound - limit if each.sense is Sense.MAX else limit - bound
-            if not beyond <= _ON_LIMIT * max(abs(limit), abs(bound)):
+            if not beyond <= ON_LIMIT * max(abs(limit), abs(bound)):
                 raise ProofError(
                     f"the bound {bound:.10g} of the proof does not satisfy the limit {limit:.10g} of the case"
                 )
@@ -318,7 +318,7 @@ class _Checker:
         rest = _stated(lemma)
         bound = self._program(robots.number(claim, rest), claim.sense, given, robots.design)
         try:
-            self._show(SecondOrderClaim(robots, claim.expression, rest), _WHOLE)
+            self._show(SecondOrderClaim(robots, claim.expression, rest), WHOLE)
         except UncoveredError as error:
             raise ProofError(f"the checker has no rule for {error.operation}") from None
         except ProofError as error:
@@ -452,17 +452,17 @@ class _Checker:
         return PosedRobot(self._case, self.robot.model, self._root)
 
 
-class _PathChecker(_Checker):
+class _PathChecker(WorkspaceChecker):
     """Check of claims along a path."""
 
     def __init__(self, proof: Proof, case: Case, path: ProgrammedPath) -> None:
         premises = proof.premises
         if not isinstance(premises, PathPremises):
             raise ProofError("the proof is not about a tool path")
+        refuse_other_robot(case, legs_of(case), premises)
         case = case_along_path(case, path)
         root = PathRoot(case, path)
         robot = robot_along_path(case, root, with_angles=premises.with_angles)
-        refuse_other_robot(case, robot.legs, premises)
         self._is_timed = path.is_timed
         self._begin(proof, case, root, robot, root.workspace)
         self.expected = expected_along_path(case, robot, is_timed=path.is_timed)

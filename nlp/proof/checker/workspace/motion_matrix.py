@@ -37,7 +37,7 @@ from .....models.instance import length_of
 from .....models.member import scaled_twists
 from .....models.rows import independent_rows
 from ....case.case import Case
-from ....case.pose import Free
+from ....case.pose import ends_of
 from ....case.workspace import TurnKind
 from ...statement.fixed_robot import has_straight_legs
 from ..proof_file import ProofError
@@ -55,7 +55,7 @@ class PosedRobot:
     """A robot with its dimensions over a workspace.
 
     Args:
-        case: case with fixed dimensions.
+        case: case with fixed dimensions, or with ranges of the dimensions that change along a path.
         model: model of the robot, possibly without some unknowns. Components of joint-centre errors may follow the
             parameters of the case.
         root: box of coordinates.
@@ -90,9 +90,9 @@ class PosedRobot:
         self.free, head, self.given, y, varying = root.symbols()
         self.dependent = [j for j, k in enumerate(self.free) if k in root.dependent]
         unknowns = ca.vertcat(SX(0, 1), *[SX.sym(item.name) for item in model.unknowns])
-        values = [float(v) for name in case.parameters for v in case.components(name) if not isinstance(v, Free)]
+        values, dimensions = _dimensions_of(case, root, y)
         errors = SX.sym("errors", symbols[0].numel() - len(values))
-        turned, self.scale = turned_rotation(root, y[3:])
+        turned, self.scale = turned_rotation(root, y[3 : root.of_pose])
         self.model, self.position = model, ca.vertcat(*y[:3])
         self.length = length_of(model, [*values, *[0.0] * errors.numel()])
         self.rotation = turned / self.scale
@@ -101,7 +101,7 @@ class PosedRobot:
 
         def put(expressions: Iterable[SX], rotation: SX = self.rotation) -> list[SX]:
             """Return expressions of the model with the coordinates in place of its symbols."""
-            numbers = [ca.vertcat(SX(0, 1), *values, errors), unknowns, rotation, self.position]
+            numbers = [ca.vertcat(SX(0, 1), *dimensions, errors), unknowns, rotation, self.position]
             return list(ca.Function("robot", symbols, list(expressions)).call(numbers))
 
         def scaled(vectors: Iterable[SX]) -> list[SX]:
@@ -178,6 +178,23 @@ class PosedRobot:
             return found
 
         return at
+
+
+def _dimensions_of(case: Case, root: Root, y: Sequence[SX]) -> tuple[list[float], list[SX]]:
+    """Return the dimensions of a robot as numbers, in the middle of those that change along a path, and as expressions.
+
+    Args:
+        case: the case.
+        root: box of coordinates, with the names of the dimensions that change.
+        y: coordinates of the pose, then these dimensions.
+    """
+    changing = dict(zip(root.settings, y[root.of_pose :], strict=True))
+    stated = [
+        (name, sum(ends_of(v)) / 2)
+        for item in case.model.parameters
+        for name, v in zip(item.components, case.components(item.name), strict=True)
+    ]
+    return [value for _, value in stated], [changing.get(name, SX(value)) for name, value in stated]
 
 
 def turned_rotation(root: Root, turn: list[SX]) -> tuple[SX, SX]:

@@ -33,6 +33,7 @@ from ....errors import UncoveredError
 from ...statement.fixed_robot import Legs
 from ...statement.tolerance import is_smooth
 from ..polynomials import UNIT
+from ..proof_file import ProofError
 from .closed_loops import Enclosed
 from .forms import ENLARGED, PRODUCT, UP, AffineMatrix, FormArithmetic, solved
 from .loop_claims import LoopClaim, PosedLoops
@@ -275,6 +276,8 @@ class ClearanceClaim:
     def __init__(self, robot: PosedRobot, pair: Sequence[int], least: float) -> None:
         self.free, self._least = robot.free, least
         (foot, arm), (other_foot, other_arm) = (robot.legs[k] for k in pair)
+        if not (foot - other_foot).is_constant():
+            raise ProofError("leg clearances cannot be proved while a dimension changes along the path")
         self._feet = np.array(ca.DM(foot - other_foot)).ravel()
         # Vectors between the ends of the two legs, times the scale: from foot to tip, tip to foot, and tip to tip.
         spans = robot.scale * (robot.position - foot), robot.scale * (robot.position - other_foot)
@@ -286,16 +289,20 @@ class ClearanceClaim:
         matrix = self._forms(lower[:, self.free], upper[:, self.free]).forms().matrix(_ENDS, (3, 4))
         gaps = matrix.M[:, :, :3] / matrix.M[:, :, 3:]
         n = _between(self._feet, gaps[:, 0], gaps[:, 1])
-        size = np.sqrt((n * n).sum(axis=1))
-        needed = max(self._least, 0.0) * size * UP
+        distance, largest = np.sqrt((n * n).sum(axis=1)), np.abs(n).max(axis=1)
+        # Any vector but zero is valid. Its largest component becomes 1, so that its size does not underflow.
+        is_vector = largest > 0
+        n = n / np.where(is_vector, largest, 1.0)[:, None]
+        needed = max(self._least, 0.0) * np.sqrt((n * n).sum(axis=1)) * UP
         along = (n * self._feet).sum(axis=1)
         holds = along - needed >= PRODUCT * (np.abs(n) @ np.abs(self._feet) + needed)
+        holds &= is_vector | (self._least <= 0)
         factors = np.column_stack([n, -needed])[:, :, None]
         slopes, rest = np.abs(matrix.A @ factors[:, None])[..., 0], (matrix.rest @ np.abs(factors))[..., 0]
         fine = (matrix.M @ factors)[..., 0] >= (slopes.sum(axis=1) + rest) * UP
         shares = np.where(fine[:, None], 0.0, slopes).sum(axis=2)
         # The distance of the legs is at most that of any two of their points.
-        return Attempt(holds & fine.all(axis=1), shares, np.asarray(size < self._least * (1 - _WRONG)))
+        return Attempt(holds & fine.all(axis=1), shares, np.asarray(distance < self._least * (1 - _WRONG)))
 
 
 def _between(feet: FloatArray, foot_to_tip: FloatArray, tip_to_foot: FloatArray) -> FloatArray:

@@ -13,6 +13,8 @@ expressions. Positions are on lines, or ``centre + (r + s g) (cos, sin)(a + s w)
 A frame rotates positions, and multiplies quaternions from the left. A turn about the tool's axis, by an angle that
 changes linearly, multiplies them from the right. An arc may miss the knots at its ends: the gap is
 part of the remainder of a piece that reaches such an end.
+
+Dimensions that change along the path are linear in s, and follow the pose.
 """
 
 from __future__ import annotations
@@ -58,8 +60,10 @@ class PathPoses:
 
     Attributes:
         is_tangents: If true, rotations are roll, pitch and yaw; otherwise quaternions.
+        settings: names of the d dimensions that change along the path: components of the robot's parameters.
+        of_pose: number of coordinates of the pose, 6 or 7; d dimensions follow.
         varying: (v,) indices of the coordinates that are not constant along the path.
-        constant: (6,) or (7,) values of the constant coordinates; 0 for varying ones.
+        constant: (6 + d,) or (7 + d,) values of the constant coordinates; 0 for varying ones.
     """
 
     def __init__(self, path: ProgrammedPath) -> None:
@@ -71,6 +75,9 @@ class PathPoses:
         self.is_tangents = bool(is_direct and np.abs(angles).max() < _LARGEST)
         # Angles that are 0 along the whole path make components of quaternions exactly 0.
         self._turning = [bool(angles[:, k].any()) for k in range(3)]
+        self.settings = path.settings.names
+        dimensions = np.zeros((len(path) + 1, 0)) if path.settings.values is None else path.settings.values
+        self._dimensions: FloatArray = dimensions
         self._numbers = self._segment_numbers()
         self._functions: dict[int, ca.Function] = {}
         self._arithmetics: dict[int, PolynomialArithmetic] = {}
@@ -81,10 +88,13 @@ class PathPoses:
         turn_in_plane = {axis for code in set(path.planes.tolist()) for axis in PLANES[code][:2]}
         knots = path.knots
         moves = [frame is not None or k in turn_in_plane or bool(np.ptp(knots[:, k])) for k in range(POSITION)]
-        turns = [not each.is_zero() for each in ca.vertsplit(pose)[POSITION:]]
-        self.varying = [k for k, each in enumerate(moves + turns) if each]
+        self.of_pose = pose.numel() - len(self.settings)
+        turns = [not each.is_zero() for each in ca.vertsplit(pose)[POSITION : self.of_pose]]
+        resets = [bool(each) for each in np.ptp(dimensions, axis=0)]
+        self.varying = [k for k, each in enumerate(moves + turns + resets) if each]
         self.constant = np.zeros(pose.numel())
         self.constant[:POSITION] = np.where(moves, 0.0, knots[0, :POSITION])
+        self.constant[self.of_pose :] = np.where(resets, 0.0, dimensions[0])
 
     def __len__(self) -> int:
         """Number of segments."""
@@ -104,9 +114,10 @@ class PathPoses:
         place = np.zeros(6) if frame is None else np.concatenate([frame.origin, frame.angles])
         placed = np.broadcast_to(place[:, None], (6, len(path)))
         exact = np.zeros((sum(map(len, positions)), len(path)))
-        angles = [] if self._tool is None else [self._tool.angles[None, :-1], self._tool.angles[None, 1:]]
-        return np.concatenate([*positions, *turns, placed, *angles]), np.concatenate(
-            [exact, *(off or [np.zeros((6, len(path)))]), np.zeros(placed.shape), *map(np.zeros_like, angles)]
+        further = [] if self._tool is None else [self._tool.angles[None, :-1], self._tool.angles[None, 1:]]
+        further += [self._dimensions[:-1].T, self._dimensions[1:].T]
+        return np.concatenate([*positions, *turns, placed, *further]), np.concatenate(
+            [exact, *(off or [np.zeros((6, len(path)))]), np.zeros(placed.shape), *map(np.zeros_like, further)]
         )
 
     def _quaternions(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -131,7 +142,9 @@ class PathPoses:
         return first, last, half[None], np.concatenate([rest, off_half[None]])
 
     def _pose(self, plane: int, s: SX, numbers: SX) -> tuple[SX, SX]:
-        """Return the pose (c, 1) of a segment in the world, and gaps (2, 1) between the arc and the knots at its ends.
+        """Return the coordinates (c, 1) of a segment: the pose in the world, and the dimensions that change.
+
+        Also return the gaps (2, 1) between the arc and the knots at its ends.
 
         Args:
             plane: index of the arc's plane; -1 for a line.
@@ -172,7 +185,8 @@ class PathPoses:
             # Components that are zero stay exactly zero.
             about = [SX(each) * ca.sin(half) if each else SX(0) for each in self._tool.axis.tolist()]
             turns = _product(turns, [ca.cos(half), *about])
-        return ca.vertcat(*position, *turns), gaps
+        dimensions = zip(take(len(self.settings)), take(len(self.settings)), strict=True)
+        return ca.vertcat(*position, *turns, *[a + s * (b - a) for a, b in dimensions]), gaps
 
     def _turn(self, s: SX, numbers: Sequence[SX]) -> list[SX]:
         """Return the coordinates of a segment's rotation in the path's frame, from the segment's data."""
@@ -227,10 +241,9 @@ class PathPoses:
             gap = np.maximum((low <= 0) * at_start.V[1], (high >= 1) * at_end.V[1])[0]
             for j, each in enumerate(found):
                 P[j][:, rows], s[j, rows], V[j][:, rows] = each.spread((0,)), each.s, each.V
+                off = self._off(self.varying[j % count], k[rows])
                 if j < count:
-                    off = gap + self._off(self.varying[j], k[rows])
-                else:
-                    off = _SERIES * self._is_slerp + self._tool_off[k[rows]]
+                    off = off + gap
                 s[j, rows] += off
                 V[j][:, rows] += [[-1.0], [1.0]] * off
         s[:, ~((ends[0] >= 0) & (ends[1] <= 1))] = np.nan
@@ -238,8 +251,11 @@ class PathPoses:
         return every[:count], every[count:]
 
     def _off(self, coordinate: int, segments: NDArray[np.intp]) -> FloatArray:
-        """Return errors (B,) of a coordinate that its expression does not contain: of the series, and of the axis."""
-        return (_SERIES * self._is_slerp + self._tool_off[segments]) * (coordinate >= POSITION)
+        """Return errors (B,) of a coordinate, or of its derivative, that its expression does not contain.
+
+        They are errors of a rotation: of the series, and of the tool's axis.
+        """
+        return (_SERIES * self._is_slerp + self._tool_off[segments]) * (POSITION <= coordinate < self.of_pose)
 
     @cached_property
     def _tool_off(self) -> FloatArray:

@@ -47,6 +47,8 @@ class PathRoot:
         box: a box that contains all poses and starts at the first pose.
         workspace: the box as a workspace; its dependent coordinates are constant and have no range.
         stated: (v,) indices of the varying independent coordinates of the pose.
+        of_pose: number of coordinates of the pose, which dimensions that change follow.
+        settings: names of these dimensions.
         coordinates: number of coordinates of a piece: the place along the path.
         lower, upper, middle, dependent: bounds and centre of the place, and dependent coordinates; see
             :class:`.pose_boxes.PoseRoot`.
@@ -61,7 +63,9 @@ class PathRoot:
     def __init__(self, case: Case, path: ProgrammedPath) -> None:
         self.poses, self._is_timed = PathPoses(path), path.is_timed
         low, high = self.poses.ranges()
-        self.workspace = _workspace(case, low, high, is_tangents=self.poses.is_tangents)
+        self.of_pose, self.settings = self.poses.of_pose, self.poses.settings
+        of_pose = slice(self.of_pose)
+        self.workspace = _workspace(case, low[of_pose], high[of_pose], is_tangents=self.poses.is_tangents)
         following, varying = [each.index for each in self.workspace.dependent], self.poses.varying
         for each in self.workspace.dependent:
             k, ends = each.index, (each.lower, each.upper)
@@ -78,7 +82,9 @@ class PathRoot:
         ]
         kind = TurnKind.ROLL_PITCH_YAW if self.poses.is_tangents else TurnKind.ANY_AXIS
         none = np.zeros(3)
-        self.box = PoseRoot(kind, none, tuple(values), lower, upper, (), math.inf, None, tuple(following), first)
+        self.box = PoseRoot(
+            kind, none, tuple(values), lower, upper, (), math.inf, None, tuple(following), first, settings=self.settings
+        )
         self.kind, self.axis, self.values = kind, none, self.box.values
         self.lower = np.array([0.0, *lower[following]])
         self.upper = np.array([float(len(path)), *upper[following]])
@@ -193,6 +199,8 @@ def _workspace(case: Case, low: FloatArray, high: FloatArray, *, is_tangents: bo
     except CaseError as error:
         raise ProofError(error.fault) from None
     following = [each.index for each in found.dependent]
+    if not following:
+        return found
     length = _STILL * robot_size(case, [sum(ends_of(each)) / 2 for each in position])
     moved = [found.names[k] for k in following if np.ptp(ends_of(stated[k])) > (length if k < POSITION else _STILL)]
     if moved:

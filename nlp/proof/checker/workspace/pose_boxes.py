@@ -72,6 +72,7 @@ class PoseRoot:
             independent components.
         at: (6,) pose from which closed loops are followed; None for the centre.
         positions: set of positions; None for all positions of the box.
+        settings: names of the dimensions that change along a path. They are the last coordinates.
     """
 
     kind: TurnKind
@@ -85,6 +86,12 @@ class PoseRoot:
     dependent: tuple[int, ...] = ()
     at: FloatArray | None = None
     positions: PositionConditions | None = None
+    settings: tuple[str, ...] = ()
+
+    @property
+    def of_pose(self) -> int:
+        """Number of coordinates of the pose."""
+        return len(self.lower) - len(self.settings)
 
     @property
     def coordinates(self) -> int:

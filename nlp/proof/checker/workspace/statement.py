@@ -38,7 +38,7 @@ from ...statement.claims import (
     one_robot_name,
     searched_claims,
 )
-from ...statement.fixed_robot import Legs, legs_of
+from ...statement.fixed_robot import Legs, check_changing, has_straight_legs, legs_of
 from ...statement.motors import in_motion, in_path_motion, motor_claims, speed_claims
 from ...statement.posed_layout import closed_layout, posed_layout, reach_claims
 from ...statement.tolerance import (
@@ -161,10 +161,7 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
         else:
             return _followed(legs, closed.model, workspace, robots.symbols, is_open=is_open, within_tolerance=robots)
     if workspace.dependent or workspace.position_set is not None:
-        symbols = tolerance_layout(
-            case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
-        )
-        return _followed(legs, closed.model, workspace, symbols, is_open=is_open)
+        return followed_claims(case, workspace)
     layout = posed_layout(case, workspace)
     place, every = reach_claims(case, closed, workspace) if closed.reaches else (layout, ())
     if every and all(each.name in reached for each in every):
@@ -175,18 +172,27 @@ def robot_claims(case: Case, workspace: Workspace, reached: Collection[str]) -> 
     return RobotClaims(legs, layout, closed.model, place, every, numbers_at)
 
 
+def followed_claims(case: Case, workspace: Workspace) -> RobotClaims:
+    """Return the nominal robot of a case with fixed dimensions, with its loops followed from the workspace centre."""
+    closed = closed_form(case.model)
+    symbols = tolerance_layout(
+        case, BuiltModel(closed.model, (), closed.reaches), 0.0, coordinates_of(pose_root(workspace))
+    )
+    return _followed(legs_of(case), closed.model, workspace, symbols, is_open=bool(case.model.unknowns))
+
+
 def case_along_path(case: Case, path: ProgrammedPath) -> Case:
     """Return a case with claims about a path; limits on speeds and powers refer to the path's motion if it has times.
 
     Raises:
-        CaseError: a dimension is free, the pose does not determine driven joints, or limits need a motion that neither
-            case nor path states.
+        CaseError: a dimension is free or may not change, the pose does not determine driven joints, or limits need a
+            motion that neither case nor path states.
         InputError: the path has no motion.
     """
     if not len(path):
         raise InputError(f"{path.source}: has no motion")
     case = case_along(case, path.settings)
-    case.fixed_parameters("a path is judged with fixed dimensions")
+    check_changing(case, path.settings.names)
     check_determined_joints(case.model, "path", case.source)
     if not path.is_timed:
         case.require_motion(", or a path that states times")
@@ -243,7 +249,7 @@ def coordinates_of(root: Root) -> PoseCoordinates:
         turned, scale = turned_rotation(root, ca.vertsplit(turn))
         return turned / scale
 
-    return PoseCoordinates(root.values, rotation, root.ball)
+    return PoseCoordinates(root.values[: root.of_pose], rotation, root.ball)
 
 
 def expected_claims(case: Case, robot: RobotClaims, quantities: Sequence[str], leg_error: float) -> list[Claim]:
@@ -286,7 +292,8 @@ def expected_along_path(case: Case, robot: RobotClaims, *, is_timed: bool) -> li
         every += [*speed_claims(case), *(each for each in of_loads if _number_of(each) is not ActuatorQuantity.SPEED)]
     else:
         every += motor_claims(case)
-    return [each for each in every if robot.legs is not None or each.kind is not ClaimKind.SPECTRUM]
+    is_of_legs = has_straight_legs(case.model)
+    return [each for each in every if is_of_legs or each.kind is not ClaimKind.SPECTRUM]
 
 
 def _number_of(claim: Claim) -> ActuatorQuantity | None:

@@ -74,6 +74,8 @@ class PathSpeeds(Number):
             ca.jtimes(coordinates, z[list(of_pose), :], pose_rates(problem)),
         ]
         parts = [ca.densify(each) for each in parts]
+        # Rounding of a speed that is exactly 0 would leave a relative gap open.
+        self._still = np.array([not ca.depends_on(each, z) for each in ca.vertsplit(coordinates)], dtype=bool)
         self._shapes = [each.shape for each in parts]
         super().__init__(problem, ca.vertcat(SX(0, 1), *map(ca.vec, parts)), coordinates.numel())
         self._parts = ca.Function("parts", [z], parts)
@@ -95,6 +97,7 @@ class PathSpeeds(Number):
             if L_u.c.size:
                 speeds = speeds.plus(q_u.matmul(solved(L_u, L_t).times(-1.0)))
             upper = np.maximum(speeds.upper(), speeds.times(-1.0).upper())[:, 0].T
+            upper[:, self._still] = 0.0
             # Only the place along the path is bisected, so the shares of all coordinates count for it.
             shares = np.abs(speeds.a[:, 0, :count]).transpose(2, 0, 1) + speeds.r[:, 0].T[:, :, None] / max(count, 1)
         shares[:, :, [k for k, j in enumerate(self.problem.independent) if j in self.problem.rates]] = 0.0

@@ -11,6 +11,7 @@ path, each piece has a reference of its own; see :mod:`.long_turns`.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -77,6 +78,25 @@ class PathTurns(Protocol):
         ...
 
 
+class OneReference(ABC):
+    """Rotations of a path relative to one reference, so that no part of a segment has a reference of its own."""
+
+    counts = None
+
+    def boxes(
+        self,
+        segments: NDArray[np.intp],
+        ends: FloatArray,
+        within: FloatArray | None = None,  # noqa: ARG002
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return ranges over pieces; see :class:`PathTurns`."""
+        return self.over(segments, ends)
+
+    @abstractmethod
+    def over(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the ends (B, 3) of ranges over pieces of segments (B,) between ends (B, 2) of the parameter."""
+
+
 class TurnsAtRates(Protocol):
     """Rotations of a path whose quaternions are products of factors that turn at constant rates in each segment."""
 
@@ -91,7 +111,7 @@ class TurnsAtRates(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Tangents:
+class Tangents(OneReference):
     """Roll, pitch and yaw that change linearly, as tangents of their halves.
 
     Attributes:
@@ -103,15 +123,9 @@ class Tangents:
     off: float = 0.0
     kind = TurnKind.ROLL_PITCH_YAW
     reference = UNTURNED
-    counts = None
 
-    def boxes(
-        self,
-        segments: NDArray[np.intp],
-        ends: FloatArray,
-        within: FloatArray | None = None,  # noqa: ARG002
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return ranges over pieces; see :class:`PathTurns`."""
+    def over(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ranges (B, 3) over pieces."""
         start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
         low, high = np.sort([start + s[:, None] * change for s in ends.T], axis=0)
         # Fixed coordinates stay fixed.
@@ -128,7 +142,7 @@ class Tangents:
 
 
 @dataclass(frozen=True, eq=False)
-class ShortestTurns:
+class ShortestTurns(OneReference):
     """Turns about fixed axes as Cayley vectors.
 
     Attributes:
@@ -148,15 +162,9 @@ class ShortestTurns:
     turning: FloatArray
     reference: Reference
     kind = TurnKind.ANY_AXIS
-    counts = None
 
-    def boxes(
-        self,
-        segments: NDArray[np.intp],
-        ends: FloatArray,
-        within: FloatArray | None = None,  # noqa: ARG002
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return ranges over pieces; see :class:`PathTurns`.
+    def over(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ranges (B, 3) over pieces.
 
         Between two points of a great circle with scalars of one sign, r moves on a straight line.
         """
@@ -192,7 +200,7 @@ class ShortestTurns:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearAngles:
+class LinearAngles(OneReference):
     """Angles of any convention that change linearly, as Cayley vectors.
 
     Attributes:
@@ -207,7 +215,6 @@ class LinearAngles:
     reference: Reference
     frame: PathFrame | None = None
     kind = TurnKind.ANY_AXIS
-    counts = None
 
     @cached_property
     def widths(self) -> FloatArray:
@@ -230,13 +237,8 @@ class LinearAngles:
         """Error bound of a quaternion of exact angles; with a frame, the quaternion is a product of one more factor."""
         return ROUNDED if self.frame is None else 2 * ROUNDED
 
-    def boxes(
-        self,
-        segments: NDArray[np.intp],
-        ends: FloatArray,
-        within: FloatArray | None = None,  # noqa: ARG002
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return ranges over pieces; see :class:`PathTurns`."""
+    def over(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ranges (B, 3) over pieces."""
         start, change = self.angles[segments], self.angles[segments + 1] - self.angles[segments]
         off = self.rounded + PER_RADIAN * (np.abs(start) + np.abs(change)).sum(axis=1)
         return chord_hull(self, segments, ends, off, self._vary)

@@ -17,6 +17,7 @@ Ends are rounded outwards, so that the box contains every pose of the workspace.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeAlias
@@ -170,10 +171,14 @@ class PoseBox:
         axis, angle = axis_angle_from_matrix(rotation)
         return PoseNumbers(frozen_array(y[:3], (3,)), rotation, axis, angle)
 
-    def coordinates(self, pose: PoseNumbers) -> FloatArray:
-        """Return the coordinates (c,) of a pose in this box; fixed coordinates are taken from the box."""
-        turn = self._turn(pose)
-        y = np.concatenate([pose.position, turn])
+    def coordinates(self, pose: PoseNumbers, settings: Sequence[float] | FloatArray = ()) -> FloatArray:
+        """Return the coordinates (c,) of a pose in this box; fixed coordinates are taken from the box.
+
+        Args:
+            pose: the pose.
+            settings: values of the dimensions that change along a path.
+        """
+        y = np.concatenate([pose.position, self._turn(pose), settings])
         return np.asarray(np.where(self.lower == self.upper, self.lower, y))
 
     def _turn(self, pose: PoseNumbers) -> FloatArray:
@@ -193,7 +198,8 @@ class PoseBox:
         # Two triples of angles describe the same rotation.
         other = [math.remainder(each, 2 * math.pi) for each in (roll + math.pi, math.pi - pitch, yaw + math.pi)]
         both = [np.tan(0.5 * np.array(each)) for each in ((roll, pitch, yaw), other)]
-        return min(both, key=lambda r: float(np.maximum(self.lower[3:] - r, r - self.upper[3:]).max()))
+        low, high = self.lower[3 : self.of_pose], self.upper[3 : self.of_pose]
+        return min(both, key=lambda r: float(np.maximum(low - r, r - high).max()))
 
     def contracted(self, lower: FloatArray, upper: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
         """Contract boxes (B, c) to the sets of positions and rotations; also return whether each result is empty."""

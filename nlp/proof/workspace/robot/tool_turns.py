@@ -17,7 +17,7 @@ import numpy as np
 from .....models import FloatArray
 from ....case.workspace import TurnKind
 from ....path.orientation import matrices_from_quaternions, quaternion_products
-from .path_turns import PER_RADIAN, ROUNDED, LinearAngles, ShortestTurns, chord_hull, relative
+from .path_turns import PER_RADIAN, ROUNDED, LinearAngles, OneReference, ShortestTurns, chord_hull, relative
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,7 +32,7 @@ _OUTWARDS = 2.0**-50
 
 
 @dataclass(frozen=True, eq=False)
-class ToolTurns:
+class ToolTurns(OneReference):
     """Rotations of a path with a turn about the tool's axis, as Cayley vectors.
 
     Attributes:
@@ -47,7 +47,6 @@ class ToolTurns:
     reference: Reference
     units: frozenset[int]
     kind = TurnKind.ANY_AXIS
-    counts = None
 
     @cached_property
     def widths(self) -> FloatArray:
@@ -80,13 +79,8 @@ class ToolTurns:
         angles = np.abs(task.angles[segments]) + np.abs(task.angles[segments + 1])
         return np.asarray(own + task.rounded + 2 * PER_RADIAN * angles.sum(axis=1))
 
-    def boxes(
-        self,
-        segments: NDArray[np.intp],
-        ends: FloatArray,
-        within: FloatArray | None = None,  # noqa: ARG002
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return ranges over pieces; see :class:`~.path_turns.PathTurns`."""
+    def over(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return ranges (B, 3) over pieces."""
         return chord_hull(self, segments, ends, self._off(segments), self._vary)
 
     def derivatives(self, segments: NDArray[np.intp], ends: FloatArray) -> tuple[FloatArray, FloatArray]:
