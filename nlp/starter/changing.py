@@ -82,10 +82,14 @@ def task_starter(model: Model, robot_file: str | None = None) -> str:
         "",
     ]
     for motion, F in motions:
-        lines += [*_motion_lines(motion), commented(f"weight = {F:.4g}", "F at home: both tasks then count alike"), ""]
+        lines += [
+            *_motion_lines(motion),
+            commented(f"weight = {1 / F:.4g}", "1 / F at home: both tasks then count alike"),
+            "",
+        ]
     lines += [
         "[combine]",
-        commented('method = "worst-case"', 'maximises the smaller F / weight; or "weighted-sum"'),
+        commented('method = "weighted-sum"', 'of F; or "worst-case", of F / weight'),
         "",
         commented("[limits]", "limits of a buildable design; they hold at the settings of every task"),
         *limit_lines(model, home),
