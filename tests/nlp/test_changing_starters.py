@@ -145,3 +145,14 @@ def test_force_overwrites_a_starter(tmp_path: Path, cli: Run) -> None:
     assert case.read_text() == plain
     output_of(cli("new", "stewart-gough", "--per", "task", "--out", str(case), "--force"))
     assert 'per = "task"' in case.read_text()
+
+
+def test_a_worst_case_takes_a_dimension_on_which_no_task_depends() -> None:
+    """The free dimension of this robot changes limits only, and F of neither task."""
+    text = task_starter(robot_function("exechon")()).replace('"weighted-sum"', '"worst-case"', 1)
+    case = case_from(text)
+    solution = solve(case, starts=4)
+    assert solution.combination is not None
+    scale = 2 / sum(task.weight for task in case.tasks)
+    levels = [each.F / (scale * task.weight) for each, task in zip(solution.outcomes, case.tasks, strict=True)]
+    assert min(levels) == pytest.approx(solution.combination.value, rel=1e-6)
