@@ -86,7 +86,8 @@ def test_a_starter_of_a_path_solves_and_keeps_its_rate(model: str, tmp_path: Pat
     for one, other in itertools.pairwise(rows):
         assert abs(other["turn"] - one["turn"]) <= 5 * (other["t"] - one["t"]) * (1 + 1e-9)
     schedule = json.loads(result.read_text())["schedule"]
-    assert schedule["value"] >= schedule["constant"]["value"] * (1 - 1e-9)
+    constant = schedule["constant"]  # null if no constant turn keeps the limits
+    assert constant is None or schedule["value"] >= constant["value"] * (1 - 1e-9)
     assert rows[-1]["t"] == pytest.approx(30, rel=0.05)
     lean = np.radians(15 if robot_function(model)().legs else 10)
     # The tool leans outwards by nearly the same angle everywhere: rows of the table are interpolated.
