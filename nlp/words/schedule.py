@@ -127,9 +127,8 @@ def _gain(schedule: ScheduleData) -> str:
     names = ", ".join(schedule.names)
     if constant is None:
         return f"no constant {names} keeps the limits"
-    if constant.gain == 0:
-        return f"best constant {names} {number(constant.value)}, no gain"
-    return f"best constant {names} {number(constant.value)}, {_signed(schedule, constant.gain)}"
+    gain = _signed(schedule, constant.gain) if constant.gain else "no gain"
+    return f"{number(constant.value)} with the best constant {names}, {gain}"
 
 
 def _signed(schedule: ScheduleData, gain: float) -> str:

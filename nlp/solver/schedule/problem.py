@@ -329,8 +329,10 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         closed = eliminated_form(case.model)
     model = closed.model
     if model.unknowns:
-        names = ", ".join(each.description or each.name for each in model.unknowns)
-        fault = f"is not supported along a path for {case.model.name!r}: no closed form of {names}"
+        limbs = _limbs_of_unknowns(case.model, model)
+        fault = (
+            f"is not supported along a path for {case.model.name!r}: no closed form of the passive joints of {limbs}"
+        )
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
@@ -383,6 +385,19 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     )
     _check_poses(problem)
     return problem
+
+
+def _limbs_of_unknowns(model: Model, left: Model) -> str:
+    """Return the limbs with unknowns that are left, in words.
+
+    Args:
+        model: the robot, whose unknowns are in the order of its chains.
+        left: the robot without the unknowns that have a closed form.
+    """
+    owners = [each.limb for each in model.structure for _ in range(each.unknowns)]
+    names = {each.name for each in left.unknowns}
+    found = dict.fromkeys(limb for each, limb in zip(model.unknowns, owners, strict=True) if each.name in names)
+    return f"limb{'s' * (len(found) > 1)} {', '.join(found)}"
 
 
 def _check_poses(problem: ScheduleProblem) -> None:
