@@ -523,6 +523,6 @@ def test_a_schedule_that_cannot_be_proved_is_refused_before_its_search(
     monkeypatch.chdir(tmp_path)
     Path("s.csv").write_text(written("x,y,z,roll,pitch,yaw,t", [(*row[:6], row[7]) for row in RADIUS_ROWS]))
     angles = {"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}}
-    assert len(schedule_problem(moving(limits=angles)).points)
-    with pytest.raises(CaseError, match="home has no x1, which changes along the path"):
-        schedule_problem(moving(limits=angles | {"over": "path"}))
+    for limits in (angles, angles | {"over": "path"}):
+        with pytest.raises(CaseError, match="home has no x1, which changes along the path"):
+            schedule_problem(moving(limits=limits))
