@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
@@ -504,7 +505,7 @@ def test_tables_curves_and_pages_have_the_settings(cli: Run, tmp_path: Path, mon
     for name in ("setting x1", "setting turn", "rate of x1", "rate of turn"):
         assert f'id="{name} {name.rpartition(" ")[2]}"' in svg
         assert f"{name[0].upper()}{name[1:]}:" in page
-    assert "24</span> .. 26.5 in" in page
+    assert re.search(r"x1</th><td[^>]*>(<[^>]*>)*24(<[^>]*>)* to 26\.5", page)
     assert "the live view does not move x1 along a path" in page
 
 
@@ -523,6 +524,5 @@ def test_a_schedule_that_cannot_be_proved_is_refused_before_its_search(
     monkeypatch.chdir(tmp_path)
     Path("s.csv").write_text(written("x,y,z,roll,pitch,yaw,t", [(*row[:6], row[7]) for row in RADIUS_ROWS]))
     angles = {"base_joint_angle": {"max": 40, "about": "home"}, "home": {"position": [0, 0, 20]}}
-    assert len(schedule_problem(moving(limits=angles)).points)
     with pytest.raises(CaseError, match="home has no x1, which changes along the path"):
         schedule_problem(moving(limits=angles | {"over": "path"}))
