@@ -284,7 +284,7 @@ def test_csv_picture_and_page(small: str, cli: Run, tmp_path: Path) -> None:
     assert drawing.count('id="no answer"') == sum(point["F"] is None for point in result["points"]) > 0
     page = files["html"].read_text(encoding="utf-8")
     assert page.count("<circle") == sum(point["F"] is not None for point in result["points"])
-    assert "infeasible at" in page
+    assert "Infeasible at" in page
     assert "http://" not in page.replace("http://www.w3.org/2000/svg", "")
 
 

@@ -44,7 +44,7 @@ def dimensions_table(case: Case) -> Markup:
         ]
         largest, unit = max(abs(end) for pair in ends for end in pair), case.units.label(item.dimension)
         for name, pair in zip(case.component_names(item), ends, strict=True):
-            rows.append((name, " to ".join(number(end, largest) for end in dict.fromkeys(pair)), unit))
+            rows.append((name, " .. ".join(number(end, largest) for end in dict.fromkeys(pair)), unit))
     table = TextTable(("", "value", "unit"), tuple(rows), "dimensions", with_unit=(1,))
     return html_table(table, "Dimensions", id="dimensions")
 
