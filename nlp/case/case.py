@@ -356,6 +356,8 @@ class Case(Whole, Shown):
             ]
             if len(values) < len(item.typical):
                 fault = f"is free, and {reason}: give it with --set, or a result with --of"
+                if set(self.component_names(item)) & self.settings.keys():
+                    fault = f"changes along the path, and {reason}: give it with --set"
                 raise CaseError(f"robot.parameters.{item.name}", fault, source=self.source)
             found += values
         return np.array(found, dtype=np.float64)

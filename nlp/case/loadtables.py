@@ -115,7 +115,7 @@ class ObjectiveTable(Table):
         if self.minimise is None and self.maximise is None and self.over is None:
             raise fault_of("minimise", "is missing: give minimise, over, or both")
         if self.minimise is not None and self.maximise is not None:
-            raise fault_of("maximise", f"conflicts with minimise = {self.minimise!r}; remove one of them")
+            raise fault_of("maximise", f'conflicts with minimise = "{self.minimise}"; remove one of them')
         if self.length is not None and self.maximise is None:
             raise fault_of("length", "has an effect only with maximise; remove it")
         return self

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...models import Dimension, FloatArray
 from ..case.case import Case
-from ..errors import CaseError
+from ..errors import CaseError, listing
 from ..solver.schedule.dynamic import sliding_maximum
 from ..solver.schedule.problem import ScheduleProblem, schedule_problem
 from ..system.markdown import markdown_text
@@ -141,8 +141,9 @@ def _check(problem: ScheduleProblem) -> None:
         fault = "is free, and codegen of a schedule needs fixed dimensions: give it with --set"
         raise CaseError(problem.design[0].name, fault, source=case.source)
     if len(problem.settings) != 1:
+        names = listing(each.name for each in problem.settings)
         fault = f"codegen has tables for one value that changes along the path; this case has {len(problem.settings)}"
-        raise CaseError("path", fault, source=case.source)
+        raise CaseError("path", f"{fault}: {names}", source=case.source)
     if problem.is_periodic:
         raise CaseError("path.periodic", "is not supported by codegen", source=case.source)
     if count > MOST_POINTS:

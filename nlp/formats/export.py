@@ -16,6 +16,7 @@ from ..evidence.closing import closed_start
 from ..evidence.state import evaluate
 from ..program.formulation import formulate
 from ..program.free_joints import begun_at
+from ..program.layout import refuse_over_path
 from ..program.nlp import Nlp
 from .solved.mechanism_of import Exported, mechanism_of
 from .writing.cutlist import cut_list_csv, drawn_links
@@ -86,7 +87,11 @@ def fixed_point(case: Case, joints: Mapping[str, float]) -> tuple[Nlp, FloatArra
     Args:
         case: the case.
         joints: values of free actuator coordinates by the names of their variables.
+
+    Raises:
+        CaseError: the case is optimised along its path, so it has no single robot.
     """
+    refuse_over_path(case)
     values = [value for name in case.parameters for value in case.components(name)]
     values += [value for pose in case.poses for value in (*pose.position, pose.rotation.angle)]
     if case.changes or any(isinstance(value, Free) for value in values) or (case.model.free_joints and not joints):

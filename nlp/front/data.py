@@ -116,11 +116,11 @@ def _lines(front: Front, result: FrontResult) -> list[str]:
     """Return a summary of a front."""
     count, goals = len(result.points), [_words(goal) for goal in front.goals]
     lines = [f"Pareto front of {count} point{'s' * (count > 1)}: {', '.join(goals[:-1])} and {goals[-1]}"]
-    for goal in front.goals:
+    for goal, unit in zip(front.goals, goal_units(front), strict=True):
         values = [point.goals[goal.label] for point in result.points]
         # The ends of a front of two goals have the extreme values.
         low, high = (values[0], values[-1]) if len(goals) == 2 else (min(values), max(values))
-        lines.append(f"{_quantity(goal)}: {low:.7g} to {high:.7g}")
+        lines.append(f"{_quantity(goal)}: {low:.7g} to {high:.7g} {unit}".rstrip())
     lines += [] if result.notice is None else [result.notice]
     if front.gaps:
         lines.append(f"gaps of the front, without points between two neighbours: {len(front.gaps)}")

@@ -154,7 +154,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
         raise CaseError(
             key, f"{fault}; use solve, report, certify or export, or a case for each task", source=case.source
         )
-    _refuse_over_path(case)
+    refuse_over_path(case)
     table, model = SymbolTable(), case.model
     owners = _Owners(table)
     parameters = [_add_parameter(case, item, owners) for item in model.parameters]
@@ -250,7 +250,7 @@ def lay_out(case: Case, tasks: Sequence[Task], add_pose: AddPose | None = None) 
     )
 
 
-def _refuse_over_path(case: Case) -> None:
+def refuse_over_path(case: Case) -> None:
     """Refuse a case that is optimised along its path: it has no pose of its own.
 
     Raises:

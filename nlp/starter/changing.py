@@ -28,9 +28,11 @@ from .text import (
     vector,
 )
 
-#: Radius of the circle relative to the reach of home, for robots on straight legs and for others; lean of the tool,
-#: degrees; and number of points.
-_RADIUS, _RADIUS_OF_OTHERS, _LEAN, _POINTS = 1.0, 0.5, 15, 40
+#: Radius of the circle relative to the reach of home, and lean of the tool, degrees: of robots on straight legs, and of
+#: others, whose joints move less.
+_CIRCLE, _CIRCLE_OF_OTHERS = (1.0, 15), (0.3, 10)
+#: Number of points of the circle.
+_POINTS = 40
 #: Time of the circle, seconds; largest turn about the tool, degrees, and its rate, degrees per second.
 _TIME, _TURN, _RATE = 30, 60, 5
 #: Smallest F of a task, relative to the square of the robot's arm for a rotation.
@@ -82,10 +84,14 @@ def task_starter(model: Model, robot_file: str | None = None) -> str:
         "",
     ]
     for motion, F in motions:
-        lines += [*_motion_lines(motion), commented(f"weight = {F:.4g}", "F at home: both tasks then count alike"), ""]
+        lines += [
+            *_motion_lines(motion),
+            commented(f"weight = {1 / F:.4g}", "1 / F at home: both tasks then count alike"),
+            "",
+        ]
     lines += [
         "[combine]",
-        commented('method = "worst-case"', 'maximises the smaller F / weight; or "weighted-sum"'),
+        commented('method = "weighted-sum"', 'of F; or "worst-case", of F / weight'),
         "",
         commented("[limits]", "limits of a buildable design; they hold at the settings of every task"),
         *limit_lines(model, home),
@@ -113,7 +119,8 @@ def path_starter(model: Model, path_file: str, robot_file: str | None = None) ->
         raise InputError(f"--per path: {fault}")
     if closed_form(model).model.unknowns:
         raise InputError(f"--per path: joints of {model.name!r} do not follow from the pose in closed form")
-    radius = round_number((_RADIUS if model.legs else _RADIUS_OF_OTHERS) * home.reach)
+    part, lean = _CIRCLE if model.legs else _CIRCLE_OF_OTHERS
+    radius = round_number(part * home.reach)
     speed = float(f"{2 * math.pi * radius / _TIME:.2g}")
     x, y, z = model.home
     lines = [
@@ -127,7 +134,7 @@ def path_starter(model: Model, path_file: str, robot_file: str | None = None) ->
         "",
         commented("[pose]", "first pose of the path; it must be fixed"),
         f"position = {vector([x + radius, y, z])}",
-        f"rotation = {{ axis = [0, 1, 0], angle = {_LEAN} }}",
+        f"rotation = {{ axis = [0, 1, 0], angle = {lean} }}",
         "",
         "[[task]]",
         'sense = "max"',
@@ -148,7 +155,7 @@ def path_starter(model: Model, path_file: str, robot_file: str | None = None) ->
         '# over = "path"   # proves the limits between the points too',
         *limit_lines(model, home),
     ]
-    return PathStarter(text_of(lines), _circle((x, y, z), radius, speed))
+    return PathStarter(text_of(lines), _circle((x, y, z), radius, speed, lean))
 
 
 def _two_motions(model: Model, home: Home) -> list[tuple[Screw, float]]:
@@ -191,13 +198,13 @@ def _holes(values: list[float], widths: list[float]) -> str:
     return f'{{ values = [{listed}], per = "task" }}'
 
 
-def _circle(centre: tuple[float, float, float], radius: float, speed: float) -> str:
+def _circle(centre: tuple[float, float, float], radius: float, speed: float, lean: float) -> str:
     """Return the table of a circle at constant speed, with a tool that leans outwards.
 
     The tool is reached from the vertical by a rotation about a horizontal axis.
     """
     lines = ["t,x,y,z,qw,qx,qy,qz"]
-    c, s = math.cos(math.radians(_LEAN) / 2), math.sin(math.radians(_LEAN) / 2)
+    c, s = math.cos(math.radians(lean) / 2), math.sin(math.radians(lean) / 2)
     for k in range(_POINTS):
         angle = 2 * math.pi * k / (_POINTS - 1)
         x, y = math.cos(angle), math.sin(angle)

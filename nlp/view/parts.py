@@ -12,6 +12,8 @@ from collections.abc import Sequence
 
 #: Number of assignments of a part, and number above which a function has parts.
 _PART, _LONG = 1000, 4000
+#: Compilers put a function that is called once into its caller, which would undo the parts.
+_APART = "__attribute__((noinline)) static"
 _FUNCTION = re.compile(r"^static int (casadi_f\d+)\(const casadi_real\*\* arg, casadi_real\*\* res, [^{}]*\) \{$")
 _DECLARATION = re.compile(r"^ *casadi_real a\d+(, a\d+)*;$|^ *\(void\).*;$")
 _ASSIGNMENT = re.compile(r"^ *(a\d+)=([^;{}]*);$")
@@ -65,7 +67,7 @@ def _parts_of(name: str, head: str, body: Sequence[str]) -> list[str]:
     place = {each: k for k, each in enumerate(sorted(set[str]().union(*kept)))}
     found = [f"static casadi_real {name}_kept[{max(1, len(place))}];"]
     for k, part in enumerate(parts):
-        found.append(f"static void {name}_part{k}(const casadi_real** arg, casadi_real** res) {{")
+        found.append(f"{_APART} void {name}_part{k}(const casadi_real** arg, casadi_real** res) {{")
         found.append("(void)arg, (void)res;")
         found += [f"  casadi_real {each}={name}_kept[{place[each]}];" for each in sorted(read[k])]
         found += [f"  casadi_real {each};" for each in sorted(written[k] - read[k])]

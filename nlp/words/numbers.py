@@ -89,6 +89,15 @@ def spaced(name: str) -> str:
     return _UNDERSCORE.sub(" ", name)
 
 
+def side_words(name: str) -> str:
+    """Return the name of an active bound or limit in words, from a key without ``limits.`` or from a quantity.
+
+    ``footprint.base`` becomes ``footprint base``, and ``leg_length limb 1- max`` becomes ``leg length limb 1- max``.
+    """
+    head, space, rest = name.partition(" ")
+    return f"{spaced(head)}{space}{rest}" if space else key_words(f"limits.{name}")
+
+
 def residual(value: float) -> str:
     """Return the text of a scaled residual; a residual below the error bound has no significant digit."""
     return f"{value:.1e}" if value > _RESIDUAL else f"below {_RESIDUAL:.0e}"

@@ -42,7 +42,7 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.elements.append((tag, dict(attrs)))
-        if tag not in {"meta", "link", "input", "img", "br"}:
+        if tag not in {"meta", "link", "input", "img", "br", "source"}:
             self._open.append(tag)
         if tag == "script":
             self.scripts.append((dict(attrs), ""))

@@ -192,7 +192,7 @@ def test_a_started_view_replaces_the_picture_and_follows_the_colour_scheme(
     assert faults(chrome) == []
 
 
-PROGRAM = "G21 G90\nG0 X0 Y0 Z20\nG0 X1\nG1 X2 Y1 F600\nG1 X0 Y1\n"
+PROGRAM = "G21 G90\nG0 X0 Y0 Z20\nG0 X1\nG1 X2 Y1 F600\nG1 X0 Y1\nM2\n"
 
 
 def test_bars_of_lengths_begin_at_their_range_and_rapid_moves_have_no_time(

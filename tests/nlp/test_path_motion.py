@@ -562,7 +562,7 @@ def test_the_page_has_the_postures_of_the_path(spindle: PathPicture) -> None:
     for text in (
         "First violation: line 4",
         "leg_length limb 1-",
-        "Leg lengths from",
+        "Leg lengths:",
         "the text of the case",
         "command at",
     ):

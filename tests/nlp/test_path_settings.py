@@ -501,9 +501,10 @@ def test_tables_curves_and_pages_have_the_settings(cli: Run, tmp_path: Path, mon
     # Speeds between rows are differences of the lengths.
     assert columns["speed 1-"][1:] == pytest.approx(np.diff(legs[:, 0]) / np.diff(columns["t"]), abs=1e-6)
     svg, page = Path("path.svg").read_text(), Path("page.html").read_text()
-    for name in ("x1", "turn", "rate of x1", "rate of turn"):
+    for name in ("setting x1", "setting turn", "rate of x1", "rate of turn"):
         assert f'id="{name} {name.rpartition(" ")[2]}"' in svg
-        assert f"{name[0].upper()}{name[1:]} from" in page
+        assert f"{name[0].upper()}{name[1:]}:" in page
+    assert "24</span> .. 26.5 in" in page
     assert "the live view does not move x1 along a path" in page
 
 

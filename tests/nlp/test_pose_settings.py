@@ -16,12 +16,13 @@ from jsonschema import Draft202012Validator
 from screwsynth.nlp import Case, CaseError, Free, Outcome, case_text, load_case, solve
 from screwsynth.nlp.case.pose import PerPose, ends_of
 from screwsynth.nlp.case.workspace import PoseSettings, Workspace
-from screwsynth.nlp.proof.checker.proof_file import Proof, ProofError, read_proof
+from screwsynth.nlp.proof.checker.proof_file import ProofError, read_proof
 from screwsynth.nlp.proof.checker.tree import Node
-from screwsynth.nlp.proof.checker.workspace.settings_check import check_settings_proof
+from screwsynth.nlp.proof.checker.workspace.settings_check import BoxChecker, check_settings_proof
+from screwsynth.nlp.proof.statement.fixed_robot import workspace_of_case
 from screwsynth.nlp.proof.workspace.judge import judge_workspace
 from screwsynth.nlp.proof.workspace.judgement import Judgement
-from screwsynth.nlp.proof.workspace.pose_settings import prove_settings
+from screwsynth.nlp.proof.workspace.pose_settings import SettingsProof, prove_settings
 from screwsynth.nlp.proof.workspace.settings_proof_writer import settings_proof_of
 from screwsynth.nlp.results.schema import result_schema
 
@@ -311,7 +312,7 @@ def test_a_robot_given_by_joints_has_settings_for_any_pose_only() -> None:
 
 
 #: Rotations besides the positions of a cube.
-TURNS: dict[str, object] = {"yaw": {"min": -6, "max": 6}, "pitch": {"min": -3, "max": 3}, "roll": 0}
+TURNS: dict[str, object] = {"yaw": {"min": -3, "max": 3}, "pitch": 0, "roll": 0}
 
 
 def turned_tables(half: float, **limits: object) -> dict[str, Any]:
@@ -322,17 +323,16 @@ def turned_tables(half: float, **limits: object) -> dict[str, Any]:
 
 
 @cache
-def proof_of_settings(half: float, limit: float) -> tuple[Case, Proof]:
-    """The proof of settings for a cube with rotations, and with a limit on singular values."""
-    tables = turned_tables(half, smallest_singular_value={"min": limit, "length": 11.5}, footprint={"base": 30})
-    case = case_from(tables, "slides")
-    found = prove_settings(case)
+def settings_of_cube() -> SettingsProof:
+    """Settings for a cube with rotations, and with a limit on the base."""
+    found = prove_settings(case_from(turned_tables(3.2, footprint={"base": 30}), "slides"))
     assert found.is_proved
-    return case, settings_proof_of(found, "")
+    return found
 
 
 def test_a_proof_of_settings_is_checked_box_by_box() -> None:
-    case, proof = proof_of_settings(3.6, 0.2)
+    found = settings_of_cube()
+    case, proof = found.case, settings_proof_of(found, "")
     (claim,) = proof.claims
     assert len(claim.sides) > 4
     again = read_proof(proof.as_text(), "again")
@@ -340,11 +340,11 @@ def test_a_proof_of_settings_is_checked_box_by_box() -> None:
     assert checked.leaves == len(claim.sides)
     # The boxes cover every pose, and their settings keep the lengths there, by kinematics of this test.
     rng, count = np.random.default_rng(5), 20_000
-    low, high = (np.array(each) for each in ((-3.6, -3.6, 16.4, 0, -3, -6), (3.6, 3.6, 23.6, 0, 3, 6)))
+    low, high = (np.array(each) for each in ((-3.2, -3.2, 16.8, 0, 0, -3), (3.2, 3.2, 23.2, 0, 0, 3)))
     y = rng.uniform(low, high, (count, 6))
     y[::2] = np.where(rng.random((len(y[::2]), 6)) < 0.5, low, high)
     y[:, 3:] = np.radians(y[:, 3:])
-    ends = [box_ends(each.workspace) for each in prove_settings(case).boxes]
+    ends = [box_ends(each.workspace) for each in found.boxes]
     reached = np.zeros(count, dtype=bool)
     for (lower, upper), values in zip(ends, claim.sides, strict=True):
         inside = ((y >= lower - 1e-15) & (y <= upper + 1e-15)).all(axis=1)
@@ -383,6 +383,7 @@ ALTERED: list[tuple[str, dict[str, Any], str]] = [
     ("a value out of its range", {"sides": (33.0,)}, "that the case does not allow"),
     ("not a number", {"sides": (math.nan,)}, "that the case does not allow"),
     ("a value that fails", {"sides": (20.0,)}, "could not be proved"),
+    ("a base that is too large", {"sides": (30.5,)}, "footprint"),
     ("no value", {"sides": None}, "value of each setting for each box"),
     ("a value too many", {"sides": (25.0, 25.0)}, "value of each setting for each box"),
     ("a box too few", {"tree": slice(0, -1)}, "incomplete"),
@@ -393,11 +394,11 @@ ALTERED: list[tuple[str, dict[str, Any], str]] = [
 @pytest.mark.parametrize(("name", "change", "words"), ALTERED)
 def test_altered_proofs_of_settings_are_rejected(name: str, change: dict[str, Any], words: str) -> None:
     assert name
-    case, proof = proof_of_settings(3.6, 0.2)
+    case, proof = settings_of_cube().case, settings_proof_of(settings_of_cube(), "")
     (claim,) = proof.claims
     if "sides" in change:
-        rest = claim.sides[1:]
-        claim = replace(claim, sides=rest if change["sides"] is None else (change["sides"], *rest))
+        given = change["sides"]
+        claim = replace(claim, sides=claim.sides[:-1] if given is None else (given, *claim.sides[1:]))
     elif isinstance(change["tree"], slice):
         claim = replace(claim, tree=claim.tree[change["tree"]])
     else:
@@ -408,10 +409,10 @@ def test_altered_proofs_of_settings_are_rejected(name: str, change: dict[str, An
 
 @pytest.mark.parametrize(
     "tables",
-    [turned_tables(3.7), turned_tables(3.6, leg_length={"min": 25.5, "max": 34}), tables_of(RANGE, 3.6, "any")],
+    [turned_tables(3.3), turned_tables(3.2, leg_length={"min": 25.5, "max": 34}), tables_of(RANGE, 3.2, "any")],
 )
 def test_proofs_of_settings_are_about_their_case(tables: dict[str, Any]) -> None:
-    _, proof = proof_of_settings(3.6, 0.2)
+    proof = settings_proof_of(settings_of_cube(), "")
     with pytest.raises(ProofError):
         check_settings_proof(proof, case_from(tables, "slides"))
 
@@ -436,3 +437,15 @@ def test_commands_write_and_check_proofs_of_settings(cli: Run, tmp_path: Path) -
     output_of(cli("workspace", one, "--proof", str(fixed)))
     code, _, err = cli("verify-proof", str(fixed), file)
     assert (code, "one claim" in err) == (1, True)
+
+
+def test_a_limit_without_a_rule_of_the_checker_is_rejected() -> None:
+    tables = case_tables("linear-delta")
+    position = [each if isinstance(each, int | float) else each["min"] for each in tables["pose"]["position"]]
+    tables["workspace"] = {"position": [{"min": c - 1, "max": c + 1} for c in position]}
+    tables["limits"] = {"smallest_singular_value": {"min": 0.01, "length": 100}}
+    stated = tables["robot"]["parameters"]
+    stated |= {name: each["min"] for name, each in stated.items() if isinstance(each, dict)}
+    case = case_from(tables, "delta")
+    with pytest.raises(ProofError, match="no rule for smallest_singular_value"):
+        BoxChecker(case, workspace_of_case(case))

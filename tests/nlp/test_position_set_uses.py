@@ -194,7 +194,7 @@ def attacked(
     return near
 
 
-@pytest.mark.parametrize("name", soaked(SETS, ["disc", "ring", "cone"]))
+@pytest.mark.parametrize("name", soaked(SETS, ["disc", "cone"]))
 @pytest.mark.parametrize("robot", ["hexapod", "delta"])
 def test_bounds_hold_on_the_rim_and_inside_in_two_units(tmp_path: Path, name: str, robot: str) -> None:
     given = sampled(name, 200.0 if robot == "hexapod" else -245.0)
@@ -434,8 +434,9 @@ def test_a_record_of_another_disc_is_rejected(tmp_path: Path, cli: Run, recorded
     nothing["premises"]["position_set"] = []
     altered = [with_set(**{name: value}) for name, value in [("radius", 100.0000001), ("radius", 99), ("radius", -100),
                ("radius", 1e300), ("inner", 1), ("x", 1.5), ("y", -2), ("shift", 0.1)]]  # fmt: skip
-    for record in [*altered, nothing]:
-        for named in ((str(case),), ()):
+    for k, record in enumerate([*altered, nothing]):
+        # A record is refused with the case of the command, and by itself.
+        for named in ((str(case),), ()) if k in (0, len(altered)) else ((str(case),),):
             code, out, err = checked(record, *named)
             assert (code, out) == (1, ""), err
             assert len(err.splitlines()) <= 2

@@ -23,23 +23,23 @@ from screwsynth.nlp.proof.workspace.robot.pose_box import pose_box, scaled
 from screwsynth.nlp.proof.workspace.scale import largest_scale
 
 
-def test_printable_diameter_of_a_linear_delta(tmp_path: Path) -> None:
+@pytest.mark.parametrize("unit", [1e-6, pytest.param(1.0, marks=pytest.mark.soak)])
+def test_printable_diameter_of_a_linear_delta(tmp_path: Path, unit: float) -> None:
     """The lowest carriage reaches its stop where R + r is the horizontal reach of a rod."""
     z = -235.0
     exact = 2 * (math.sqrt(ROD**2 - (LOWEST - z) ** 2) - RADIUS)
-    for unit in (1.0, 1e-6):
-        case = delta(tmp_path, {"disc": {"diameter": 160 * unit, "z": z * unit}}, unit=unit)
-        found = largest_scale(case)
-        assert found.factor is not None
-        assert exact * (1 - 1e-3) <= 160 * found.factor <= exact
-        assert found.positions is not None
-        assert 2 * found.positions.radius == pytest.approx(160 * unit * found.factor)
-        assert found.refuted
-        assert found.pose is not None
-        # The pose beyond violates the limit, on the rim of the next disc.
-        at = found.pose.position / unit
-        assert heights(at[None]).min() < LOWEST
-        assert 2 * math.hypot(*at[:2]) <= 160 * found.failed * (1 + 1e-9)
+    case = delta(tmp_path, {"disc": {"diameter": 160 * unit, "z": z * unit}}, unit=unit)
+    found = largest_scale(case)
+    assert found.factor is not None
+    assert exact * (1 - 1e-3) <= 160 * found.factor <= exact
+    assert found.positions is not None
+    assert 2 * found.positions.radius == pytest.approx(160 * unit * found.factor)
+    assert found.refuted
+    assert found.pose is not None
+    # The pose beyond violates the limit, on the rim of the next disc.
+    at = found.pose.position / unit
+    assert heights(at[None]).min() < LOWEST
+    assert 2 * math.hypot(*at[:2]) <= 160 * found.failed * (1 + 1e-9)
 
 
 def test_only_the_radius_is_scaled(tmp_path: Path) -> None:
@@ -252,7 +252,10 @@ CYLINDER = {"cylinder": {"radius": 25.0, "start": [-30.0, 0.0, -260.0], "end": [
 SECTOR = {"ring": {"radius": 80.0, "inner_radius": 50.0, "angle": {"min": 40.0, "max": 310.0}, "z": [-250.0, -240.0]}}
 
 
-@pytest.mark.parametrize("position", [BALL, CONE, CYLINDER, SECTOR])
+# The boxes of every kind of set are also tested without a robot, above.
+@pytest.mark.parametrize(
+    "position", [BALL, CONE, *(pytest.param(each, marks=pytest.mark.soak) for each in (CYLINDER, SECTOR))]
+)
 def test_bounds_over_a_set_against_dense_samples(tmp_path: Path, position: object) -> None:
     case = delta(tmp_path, position, limited=False)
     assert case.workspace is not None

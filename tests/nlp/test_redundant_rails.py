@@ -66,3 +66,10 @@ def test_twenty_independent_turns_reach_the_mean_of_their_optima() -> None:
     found = solve(load_case(str(_DATA / "twenty-turns.toml"))).F
     assert np.mean(optima) == pytest.approx(1.867195, abs=1e-6)
     assert found == pytest.approx(np.mean(optima), abs=1e-8)
+
+
+def test_another_radius_is_no_other_assembly(cli: Run) -> None:
+    """Points besides those of the dimension keep their places, so the robot is not a larger one of the same shape."""
+    code, out, _ = cli("evaluate", str(_PLANAR), "--set", "r=2.1")
+    assert code == 0
+    assert "assembly" not in out

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from builders import Run, assert_words, output_of, saved
 from test_live_pages import IN_VIEW, POSE, READY, act, faults, fits, words
-from test_schedule_measures import _ANY_FORCE, _RADIUS, _forces, _minimised
+from test_schedule_measures import _ANY_FORCE, _NO_TASK, _RADIUS, _forces, _jacobian, _minimised
 from test_schedules import _DEGREE, _circle, _objective, _struts, _written
 
 from screwsynth.models import FloatArray
@@ -250,6 +250,31 @@ def test_a_smallest_force_has_its_value_and_its_table(opened: Callable[..., Any]
 
 @needs_compiler
 @pytest.mark.browser
+@pytest.mark.soak
+def test_a_smallest_singular_value_is_that_of_the_moved_robot(
+    opened: Callable[..., Any], cli: Run, tmp_path: Path
+) -> None:
+    objective = ('as = "mean"', 'as = "mean"\nmaximise = "smallest_singular_value"\nlength = 11')
+    case = _written(tmp_path, _NO_TASK, objective, count=12)
+    page = tmp_path / "page.html"
+    output_of(cli("view", str(case), "--no-open", "--out", str(page)))
+    schedule = solve(load_case(str(case))).schedule
+    assert schedule is not None
+    chrome = opened(page)
+    before = words(chrome, "singular")
+    act(chrome, SET, 0, 7.5)
+    J = _jacobian(schedule.poses.positions[0], schedule.poses.rotations[0], 7.5 * _DEGREE)
+    expected = np.linalg.svd(J / np.repeat([11.0, 1.0], 3), compute_uv=False)[-1]
+    assert _value(chrome) == pytest.approx(expected, rel=1e-9)
+    # The singular value of the table has the length of the robot.
+    assert words(chrome, "singular") not in (before, f"{expected:.5g}")
+    assert_words(words(chrome, "F"), "smallest singular value = ")
+    assert faults(chrome) == []
+
+
+@needs_compiler
+@pytest.mark.browser
+@pytest.mark.soak
 def test_loops_follow_the_path(opened: Callable[..., Any], cli: Run, tmp_path: Path) -> None:
     """Joints of closed loops follow the path and the turn, in the assembly mode of home."""
     table = "".join(f"{0.5 * k},{0.02 * k - 0.1:.3f},{0.03 * (k % 3):.3f},1.2\n" for k in range(11))

@@ -195,7 +195,11 @@ HOSTILE = """
 title = "a</script><script>window.hacked=1</script>\\u2028'\\"<img src=x onerror=window.hacked=2>"
 units = { length = "cm" }
 pose = { position = [0, 0, { min = 15, max = 30 }] }
-task = [{ name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf }]
+task = [
+  { name = "</script><b>&amp;'\\u2028", sense = "max", axis = [0, 0, 1], pitch = inf },
+  { name = "<!-- ${x} \\\\ $title WWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWWW", sense = "max", axis = [1, 0, 0], pitch = inf },
+]
+combine = { method = "worst-case" }
 limits = { leg_length = { min = 2, max = 60 } }
 solve = { starts = 2 }
 [robot]
@@ -207,15 +211,18 @@ parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = 20 }
 @needs_compiler
 @pytest.mark.browser
 def test_texts_of_a_case_stay_texts(live: Callable[..., Live], tmp_path: Path) -> None:
-    case = saved(tmp_path / "hostile.toml", HOSTILE)
-    page = live(str(case), fragment="#p_z=<img src=x>&x1=NaN&p_x=1e999&held=__proto__&mode=</script>")
+    case = saved(tmp_path / "a 'b' ${x} <!-- $title.toml", HOSTILE)
+    page = live(str(case), width=420, fragment="#p_z=<img src=x>&x1=NaN&p_x=1e999&held=__proto__&mode=</script>")
     assert page.chrome.execute_script("return [window.hacked, document.images.length]") == [None, 0]
     assert "</script><script>window.hacked=1</script>" in page.shown("answer")[0] + str(
         page.chrome.execute_script("return document.querySelector('h1').textContent")
     )
     assert page.shown("word") == ["optimal"]
     assert page.faults == []
-    html = Page((tmp_path / "hostile.html").read_text(encoding="utf-8"))
+    assert page.chrome.execute_script("return document.documentElement.scrollWidth") <= 420
+    assert [each[1][:12] for each in task_values(page)] == ["</script><b>", "<!-- ${x} \\ "]
+    assert shlex.split(page.copied("copy-set"))[2] == str(case)
+    html = Page(case.with_suffix(".html").read_text(encoding="utf-8"))
     assert len(html.scripts) == 3
 
 
@@ -476,7 +483,7 @@ def test_weights_of_tasks_have_sliders(live: Callable[..., Live], cli: Run, tmp_
 TWO_BY_TWO = """
 title = "two tasks, two poses"
 units = { length = "cm" }
-pose = [{ position = [0, 0, { min = 15, max = 30 }] }, { position = [3, 1, 22], angle = 5, axis = [1, 0, 0] }]
+pose = [{ position = [0, 0, { min = 15, max = 30 }] }, { position = [3, 1, 22] }]
 combine = { method = "worst-case", over_poses = "mean" }
 solve = { starts = 4 }
 [[task]]
@@ -492,10 +499,10 @@ point = [0, 0, 0]
 pitch = 0
 [robot]
 model = "stewart-gough"
-parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = { min = 5, max = 40 } }
+parameters = { x1 = 12, x2 = 4, x3 = 30, x4 = { min = 5, max = 28 } }
 """
 #: F of a task, and its separate optimum if it is known.
-TASK_VALUE = re.compile(r"^(.+): F = (\S+) \S+?(?:, (\S+) % of the separate (maximum|minimum) (\S+))?$")
+TASK_VALUE = re.compile(r"^(.+): F = (\S+) \S+?(?:, (\S+)\xa0% of the separate (maximum|minimum) (\S+))?$")
 
 
 def task_values(page: Live) -> list[re.Match[str]]:
@@ -525,7 +532,7 @@ def test_the_headline_has_each_task_as_a_part_of_its_own_optimum(
         assert float(part) == pytest.approx(100 * outcome.F / outcome.own.F, rel=1e-3)
     # A moved value changes F, and no separate optimum.
     page.click("mode-evaluate")
-    page.move("p_z" if name == "peg-in-hole" else "pose1_p_z", 23.0)
+    page.move("x2" if name == "peg-in-hole" else "pose1_p_z", 23.0)
     target = tmp_path / "evaluated.json"
     assert cli(*shlex.split(page.copied("copy-set"))[1:], "--json", str(target))[0] in (0, 1)
     expected = [each["F"] for each in json.loads(target.read_text())["tasks"]]
@@ -540,10 +547,23 @@ def test_the_headline_has_each_task_as_a_part_of_its_own_optimum(
     assert page.faults == []
 
 
+@needs_compiler
+@pytest.mark.browser
+def test_a_page_goes_on_where_the_robot_cannot_close(live: Callable[..., Live]) -> None:
+    page = live("five-bar")
+    page.click("mode-evaluate")
+    before = page.F
+    page.move("forearm", 0.125)
+    assert_words(" ".join(page.shown("F", "word", "words")), "no robot", "no configuration")
+    page.click("to-start")
+    assert pytest.approx(before, rel=1e-12) == page.F
+    assert page.faults == []
+
+
 @pytest.mark.browser
 def test_a_page_without_a_solver_and_an_answer_has_the_value_of_its_point(live: Callable[..., Live]) -> None:
     page = live("differential-waist")
-    assert_words(*page.shown("F", "word", "words"), "F = ", "point", "nothing is optimised")
+    assert_words(" ".join(page.shown("F", "word", "words")), "F = ", "point", "nothing is optimised")
     assert page.shown("task-values") == [""]
     assert page.faults == []
 

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Hashable, Sequence
 from functools import cached_property, partial
 from operator import mul
-from typing import TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -260,6 +260,20 @@ def between(
     )
 
 
+class Extent(NamedTuple):
+    """Limit on the smallest and the largest of several values: ``largest - ratio * smallest <= most``.
+
+    Attributes:
+        name: name of the limit, in the words of a case.
+        ratio: multiple of the smallest value.
+        most: upper bound.
+    """
+
+    name: str
+    ratio: float
+    most: float
+
+
 @dataclass(frozen=True, eq=False)
 class PairFamily:
     """Constraints on all ordered pairs of N values, such as the lengths of a leg at several poses.
@@ -271,9 +285,13 @@ class PairFamily:
         values: (N, 1) values, N >= 2.
         pair: function from two indices to the constraints on these values; they are tightest for the smallest value
             as the first one and the largest as the second one.
-        slack: function from two values to their smallest margin; negative for a violated limit.
+        extents: the same constraints on the smallest and the largest value.
     """
 
     values: SX
     pair: Callable[[int, int], tuple[BoundedConstraint, ...]]
-    slack: Callable[[float, float], float]
+    extents: tuple[Extent, ...]
+
+    def slack(self, smallest: float, largest: float) -> float:
+        """Return the smallest margin of two values; negative for a violated limit."""
+        return min(each.most - largest + each.ratio * smallest for each in self.extents)

@@ -7,7 +7,6 @@ pairs of poses: ``longest - shortest <= s`` means ``l_i - l_j <= s`` for all pai
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +18,7 @@ from pydantic import Field, FiniteFloat
 
 from ....models import Dimension, Model, RobotInstance
 from ..table import Table
-from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Form, PairFamily, between
+from .constraint import POSITIVE_LENGTH, SQUARED_LENGTH, BoundedConstraint, Call, Extent, Form, PairFamily, between
 from .interval import IntervalLimit, LimitTable, QuantityLimit, quantity_named
 from .limit import Design, Limit, Measures, NumberRange, PosedRobot, Ranges
 
@@ -111,7 +110,7 @@ class Actuator(Limit[ActuatorTable]):
         for i, leg in enumerate(design.robots[0].legs):
             spans = ca.horzcat(*[robot.legs[i].span for robot in design.robots])
             lengths = ca.vertcat(*[ca.norm_2(spans[:, k]) for k in range(len(design.robots))])
-            yield PairFamily(lengths, partial(self._pair, leg.name, spans), self._slack)
+            yield PairFamily(lengths, partial(self._pair, leg.name, spans), tuple(self._extents(leg.name)))
 
     def _pair(self, leg: str, spans: SX, a: int, b: int) -> tuple[BoundedConstraint, ...]:
         """Return the constraints on a leg with spans (3, N) that is shorter at pose ``a`` than at pose ``b``."""
@@ -126,8 +125,9 @@ class Actuator(Limit[ActuatorTable]):
             limits.append(between(f"{key}{where}", dead, POSITIVE_LENGTH, (key, ""), lower=self.dead_length))
         return tuple(limits)
 
-    def _slack(self, shorter: float, longer: float) -> float:
-        """Return the smallest margin of two lengths of a leg; negative for a violated limit."""
-        stroke = math.inf if self.stroke_max is None else self.stroke_max - (longer - shorter)
-        dead = math.inf if self.dead_length is None else 2 * shorter - longer - self.dead_length
-        return min(stroke, dead)
+    def _extents(self, leg: str) -> Iterator[Extent]:
+        """Yield the limits on the shortest and the longest length of a leg."""
+        if self.stroke_max is not None:
+            yield Extent(f"actuator.stroke_max limb {leg}", 1.0, self.stroke_max)
+        if self.dead_length is not None:
+            yield Extent(f"actuator.dead_length limb {leg}", 2.0, -self.dead_length)

@@ -251,11 +251,12 @@ def _answer(solution: Solution) -> dict[str, Any]:
     found: dict[str, Any] = {"x": x.tolist(), "isOptimum": solution.status.is_answer, "optima": [], "tasks": []}
     if isinstance(result, SolveResult):
         return {**found, "words": headline(result, solution.case).words}
-    value = "" if result.combined.value is None else f" = {number(result.combined.value)}"
+    method, value = solution.case.method.value, result.combined.value
+    words = f"tasks combined by {method}" if value is None else f"{method} = {number(value)}"
     units = [unit_of_objective(solution.case, k) for k in range(len(result.combined.tasks))]
     return {
         **found,
-        "words": f"{solution.case.method.value}{value}   ({solution.status.value})",
+        "words": f"{words}   ({solution.status.value})",
         "optima": [each.best for each in result.combined.tasks],
         "tasks": [_task_words(each, unit) for each, unit in zip(result.combined.tasks, units, strict=True)],
     }
@@ -268,7 +269,7 @@ def _task_words(task: OutcomeData, unit: str) -> str:
     words = f"{task.name}: F = {number(task.F)} {unit}".rstrip()
     if task.best is None:
         return words
-    part = f"{100 * task.F / task.best:.4g} % of " if task.best else ""
+    part = f"{100 * task.F / task.best:.4g}\N{NO-BREAK SPACE}% of " if task.best else ""
     return f"{words}, {part}the separate {task.sense.value}imum {number(task.best)}"
 
 

@@ -47,7 +47,7 @@ def _live_view(picture: PathPicture, view: PathView, name: str) -> LiveView:
     """Return the live view along a path; the reason without C for the case, or if dimensions change along the path."""
     if moving := picture.judged.path.settings.names:
         names = " and ".join(map(picture.judged.case.parameter_name, moving))
-        return no_live_view(f"it does not move {names} along a path")
+        return no_live_view(f"the live view does not move {names} along a path")
     try:
         source = view_source(_case_along(picture, view))
         parts = live_parts(source, None, name, _track(picture, view, source))

@@ -72,7 +72,7 @@ class PathPanel(NamedTuple):
         curves: curves of the chart, at least one.
         limits: limits of the case, in this unit.
         is_cut: True if very large values are omitted.
-        is_coordinate: True for coordinates of actuators, False for their forces and speeds.
+        is_coordinate: True for coordinates of actuators and values of settings, False for forces, speeds and rates.
         is_speed: True for speeds, which only segments with a time have.
         is_lower: True if the only limit is a lower one.
         is_setting: True if the only curve is a setting of the path, or its rate, instead of curves of actuators.
@@ -234,7 +234,7 @@ def _settings(judged: Judgement, samples: PathSamples) -> Iterator[PathPanel]:
         rate = _RATES.get(dimension, Dimension.NUMBER)
         factor, speed = (units.shown(1.0, each) for each in (dimension, rate))
         curve = PathCurve(name, k, factor * values[:, k])
-        yield PathPanel(name, units.label(dimension), (curve,), (), is_setting=True)
+        yield PathPanel(f"setting {name}", units.label(dimension), (curve,), (), is_coordinate=True, is_setting=True)
         if path.is_timed:
             curve = PathCurve(name, k, speed * rates[:, k])
             yield PathPanel(f"rate of {name}", units.label(rate) or "1/s", (curve,), (), is_setting=True)

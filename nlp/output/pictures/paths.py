@@ -76,7 +76,7 @@ def _paint(axes: Axes, picture: PathPicture, panel: PathPanel) -> None:
         axes.plot(
             picture.at,
             curve.values,
-            color=ACTUATOR_COLOURS[curve.place % len(ACTUATOR_COLOURS)],
+            color=INK if panel.is_setting else ACTUATOR_COLOURS[curve.place % len(ACTUATOR_COLOURS)],
             linewidth=1.2,
             linestyle="--" if curve.is_other else "-",
             gid=f"{'smallest ' * curve.is_other}{panel.title} {curve.name}",

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import EvaluationError
 from ...words.designs import ColumnKind, Designs, DrawnDesign, Join, Row, designs_table
-from ...words.numbers import key_words
+from ...words.numbers import key_words, side_words
 from ..pictures.designs import design_pictures, legend_of, page_figure
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.figures import picture_of
@@ -64,7 +64,7 @@ def _sections(table: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     beside = tag("div", tag("div", _picture(table), class_="wide"), aside, class_="beside")
     yield (
         *page.picture,
-        join_markup([paragraphs(map(key_words, page.rules)), beside, paragraphs(map(key_words, page.cautions))]),
+        join_markup([paragraphs(map(_in_words, page.rules)), beside, paragraphs(map(_in_words, page.cautions))]),
     )
     yield "designs", page.designs, design_figures(designs)
     yield (*page.table, designs_rows(table))
@@ -87,7 +87,7 @@ def _picture(designs: Designs[Row]) -> Markup:
 def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
     """Yield anchor, heading and content of the sections of a page about several robots."""
     page = designs.page
-    yield (*page.table, join_markup([paragraphs(map(key_words, page.rules)), designs_rows(designs)]))
+    yield (*page.table, join_markup([paragraphs(map(_in_words, page.rules)), designs_rows(designs)]))
     with suppress(EvaluationError):  # if no robot has an optimum
         *robots, wide, narrow = robot_pictures(designs)
         alt = "Robot at its design; the values are in the table."
@@ -104,7 +104,8 @@ def _list_sections(designs: Designs[Row]) -> Iterator[tuple[str, str, Markup]]:
 
 def _in_words(sentence: str) -> str:
     """Return a sentence with limits in words; one with an option of a command keeps the keys."""
-    return sentence if "--" in sentence else key_words(sentence)
+    words = sentence if "--" in sentence else key_words(sentence)
+    return f"{words[:1].upper()}{words[1:]}"
 
 
 def designs_rows(designs: Designs[Row]) -> Markup:
@@ -112,7 +113,8 @@ def designs_rows(designs: Designs[Row]) -> Markup:
     few = (
         "" if len(designs.rows) <= _ROWS else f"The first {_ROWS} of {len(designs.rows):,} rows; CSV and JSON have all."
     )
-    below = tag("p", f"Active in all rows: {key_words(designs.throughout)}.") if designs.throughout else None
+    throughout = ", ".join(map(side_words, designs.throughout.split(", ")))
+    below = tag("p", f"Active in all rows: {throughout}.") if designs.throughout else None
     rows = html_table(designs_table(designs, _ROWS), designs.caption, id="swept" if designs.join is Join.GRID else None)
     return tag("div", tag("p", few) if few else None, rows, below)
 
@@ -145,7 +147,7 @@ def bend_lines(designs: Sequence[DrawnDesign], heading: str) -> Markup:
     found = bends([frozenset(each.active) for each in designs])
     lines = [
         f"Between {designs[k - 1].name} and {designs[k].name}: "
-        f"{key_words(changed_words(designs[k - 1].active, designs[k].active))}."
+        f"{changed_words(*(list(map(side_words, each.active)) for each in designs[k - 1 : k + 1]))}."
         for k in found
     ]
     if not lines:

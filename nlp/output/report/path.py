@@ -11,8 +11,6 @@ from ...results.path import PathVerdictData
 from ...system.jsonvalues import json_data
 from ...words.path import checked_claims, fault_words, first_refuted, path_summary, verdict_words
 from ...words.poses import pose_words
-from ..pictures.figures import narrow_picture
-from ..pictures.figures import picture as picture_file
 from ..pictures.pathpanels import (
     ACTUATOR_COLOURS,
     LIMIT_COLOURS,
@@ -31,7 +29,6 @@ from .markup import (
     beside,
     caption,
     contents_and_body,
-    image_source,
     join_markup,
     packed_plotly,
     paragraphs,
@@ -41,6 +38,7 @@ from .markup import (
     whole_page,
 )
 from .pathview import MOST_MARGIN, PathView, path_view, thinned
+from .stills import narrow_image, still_element
 from .verdicts import dimensions_table, origin, refuting_place, shown_verdicts
 
 #: Largest number of points of a curve.
@@ -97,7 +95,7 @@ def _first_screen(picture: PathPicture, view: PathView | None, live: LiveView) -
     if view is None or not live.is_live:
         return live.markup
     words = view.data["frames"][view.data["first"]]["words"]
-    image = tag("img", src=image_source(narrow_picture(view.drawing)), alt=f"Robot: {words}", class_="design")
+    image = narrow_image(view.drawing, alt=f"Robot: {words}", class_="design")
     figure = tag("figure", image, caption("Robot", f"{words}."))
     table = dimensions_table(picture.judged.case)
     return join_markup([_controls(view), live.shown(beside(figure, table))])
@@ -138,9 +136,8 @@ def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Mar
         tag("select", *options, id="path-colour" if is_live else "colour"),
     )
     coloured = [tag("p", *colour, class_="controls script")] if data["limits"] else []
-    still = image_source(picture_file([view.drawing], ".svg"))
     if is_live:
-        image = tag("img", src=still, alt=f"Robot, {words}.", class_="design printed")
+        image = narrow_image(view.drawing, alt=f"Robot, {words}.", class_="design printed")
         return join_markup([*coloured, tag("figure", image, _legend(picture, data["marks"] != []))])
     flat = "No WebGL in this browser: the drawing of the robot is fixed, but the curves follow the slider."
     figure = tag(
@@ -149,7 +146,7 @@ def _robot(picture: PathPicture, view: PathView | None, *, is_live: bool) -> Mar
         tag(
             "div",
             script_frame("view", "picture", "3-D view of the robot and of the path of its platform's origin."),
-            tag("img", src=still, alt=f"Robot, {words}.", class_="still chosen"),
+            still_element(view.drawing, alt=f"Robot, {words}.", class_="still chosen"),
             class_="stage",
         ),
         view_buttons(),
@@ -214,7 +211,8 @@ def _panel(picture: PathPicture, panel: PathPanel, shown: list[int]) -> Markup:
     names, strips = actuator_names(picture), dict[int, list[Curve]]()
     names = {each.place: "" for each in panel.curves} if panel.is_setting else names
     for each in panel.curves:
-        kind = f"curve a{each.place % count}{' other' * each.is_other}"
+        colour = "" if panel.is_setting else f" a{each.place % count}"
+        kind = f"curve{colour}{' other' * each.is_other}"
         strips.setdefault(each.place, []).append(Curve(at, each.values[shown].tolist(), kind))
     every = np.concatenate([each.values[np.isfinite(each.values)] for each in panel.curves])
     ends = f"{every.min():.5g} to {every.max():.5g} {panel.unit}".rstrip() if every.size else "no known value"

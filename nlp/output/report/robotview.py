@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
-from ..pictures.drawing import Drawing
-from ..pictures.figures import narrow_picture, page_pictures
 from ..pictures.style import RATE_COLOURS
 from .frames import ViewData
 from .markup import (
     Markup,
     beside,
     caption,
-    image_source,
     join_markup,
     paragraphs,
-    picture_element,
     script_frame,
     tag,
     view_buttons,
 )
 from .report import Report
+from .stills import narrow_image, still_element
 from .tables import aligned
 
 #: Largest number of drawings in a page; further views have only their tables.
 _DRAWINGS = 12
-#: Outlines of an SVG picture, and numbers with more digits than are visible.
-_OUTLINE, _DIGITS = re.compile(rb' d="[^"]*"'), re.compile(rb"(\.\d\d)\d+")
-
-
-def _with_fewer_digits(content: bytes) -> bytes:
-    """Return an SVG picture with two decimal places in its outlines, in units of 1/72 in."""
-    return _OUTLINE.sub(lambda found: _DIGITS.sub(rb"\1", found[0].replace(b"\n", b" ")), content)
 
 
 def pose_controls(views: list[ViewData], poses: int) -> Markup | None:
@@ -64,14 +53,8 @@ def drawings(report: Report) -> Markup:
     for index, view, drawing in found[:_DRAWINGS]:
         words = f"Robot, {view['pose_words']}; values are in the table."
         kind = "still" if index else "still chosen"
-        stills.append(_still(drawing, alt=words, class_=kind, data_view=index))
+        stills.append(still_element(drawing, alt=words, class_=kind, data_view=index))
     return join_markup(stills)
-
-
-def _still(drawing: Drawing, **attributes: object) -> Markup:
-    """Return a drawing as a picture for wide and narrow windows; the attributes are those of the image."""
-    wide, narrow = map(_with_fewer_digits, page_pictures(drawing))
-    return picture_element(wide, narrow, **attributes)
 
 
 def first_still(report: Report) -> Markup:
@@ -79,9 +62,8 @@ def first_still(report: Report) -> Markup:
     drawing = next((drawing for part in report.parts for drawing in part.drawings), None)
     if drawing is None:
         return Markup("")
-    source = image_source(_with_fewer_digits(narrow_picture(drawing)))
     words = "the design, at its first pose" if report.case.poses_per_task > 1 else "the design"
-    image = tag("img", src=source, alt=f"Robot: {words}", class_="design")
+    image = narrow_image(drawing, alt=f"Robot: {words}", class_="design")
     return tag("figure", image, caption("Robot", words, "; limbs with their rates." if drawing.rows else "."))
 
 
@@ -144,7 +126,7 @@ def _still_parts(report: Report) -> Iterator[Markup]:
                 yield tag("h3", f"{heading}, worst pose" if view["is_worst"] else heading)
             parts = []
             if shown < _DRAWINGS:
-                image = _still(drawing, alt=f"Robot, {words}", class_="design")
+                image = still_element(drawing, alt=f"Robot, {words}", class_="design")
                 parts.append(tag("figure", image, caption("Robot", _legend(view, is_still=True))))
             shown += 1
             if view["rows"]:

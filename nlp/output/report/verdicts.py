@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from itertools import groupby
 
 from ...case.case import Case
+from ...case.pose import ends_of
 from ...results.parts import VersionsData
 from ...words.numbers import key_words, number, spaced
 from ...words.tables import origin_table
@@ -35,22 +36,28 @@ def shown_verdicts(items: Iterable[Line | TextTable], key: str, words: str) -> M
 
 
 def dimensions_table(case: Case) -> Markup:
-    """Return the table of the robot's dimensions, which are fixed."""
+    """Return the table of the robot's dimensions: fixed values, and ranges of those that change along a path."""
     rows = []
-    every = iter(case.fixed_parameters("the page has fixed dimensions").tolist())
     for item in case.model.parameters:
-        names = case.component_names(item)
-        values = [case.units.shown(next(every), item.dimension) for _ in names]
-        largest, unit = max(map(abs, values)), case.units.label(item.dimension)
-        rows += [(name, number(value, largest), unit) for name, value in zip(names, values, strict=True)]
+        ends = [
+            [case.units.shown(end, item.dimension) for end in ends_of(value)] for value in case.components(item.name)
+        ]
+        largest, unit = max(abs(end) for pair in ends for end in pair), case.units.label(item.dimension)
+        for name, pair in zip(case.component_names(item), ends, strict=True):
+            rows.append((name, " to ".join(number(end, largest) for end in dict.fromkeys(pair)), unit))
     table = TextTable(("", "value", "unit"), tuple(rows), "dimensions", with_unit=(1,))
     return html_table(table, "Dimensions", id="dimensions")
 
 
 def refuting_place(claim: str, pose: str, command: str) -> Markup:
     """Return a violated claim with its pose, and the command that shows the pose."""
+    return join_markup([tag("h3", in_words(claim)), tag("p", f"At {pose}."), shown_command(command)])
+
+
+def in_words(claim: str) -> str:
+    """Return a claim with its quantity and its limit in words, for a heading or a caption."""
     name, space, rest = key_words(claim).partition(" ")
-    return join_markup([tag("h3", f"{spaced(name)}{space}{rest}"), tag("p", f"At {pose}."), shown_command(command)])
+    return f"{spaced(name)}{space}{rest}"
 
 
 def shown_command(command: str) -> Markup:

@@ -13,11 +13,9 @@ from ...results.claims import refuted_claims, worst_claim
 from ...results.workspace import WorkspaceResult
 from ...system.jsonvalues import json_data
 from ...words.claims import claim_words
-from ...words.numbers import key_words
 from ...words.poses import pose_words
 from ...words.verdicts import tolerance_lines
 from ...words.workspace import verdict_words, workspace_summary
-from ..pictures.figures import page_pictures
 from ..pictures.workspaces import Kind, drawing_at, slice_images, slices_legend, slices_notes
 from .markup import (
     Markup,
@@ -28,11 +26,11 @@ from .markup import (
     image_source,
     join_markup,
     paragraphs,
-    picture_element,
     tag,
     whole_page,
 )
-from .verdicts import dimensions_table, origin, refuting_place, shown_command, shown_verdicts
+from .stills import still_element
+from .verdicts import dimensions_table, in_words, origin, refuting_place, shown_command, shown_verdicts
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +107,12 @@ def _robot(report: WorkspaceReport) -> Markup:
     if worst is None:
         return Markup("")
     try:
-        wide, narrow = page_pictures(drawing_at(report.case, worst))
+        drawing = drawing_at(report.case, worst)
     except EvaluationError as error:
         return tag("p", f"No picture: {error}.")
     at = pose_words(report.case, worst.pose)
-    image = picture_element(wide, narrow, alt=f"Robot at {at}: {claim_words(worst)}", class_="posed")
-    words = caption("Robot at the worst pose", f"{key_words(claim_words(worst))}; at {at}.")
+    image = still_element(drawing, alt=f"Robot at {at}: {in_words(claim_words(worst))}", class_="posed")
+    words = caption("Robot at the worst pose", f"{in_words(claim_words(worst))}; at {at}.")
     return tag("figure", image, words, shown_command(report.command(worst.pose)))
 
 

@@ -1,4 +1,4 @@
-"""Settings of which any value may do at a pose: their ranges, and the case with chosen values."""
+"""Cases with chosen values of settings, and the ranges of settings of which any value may do at a pose."""
 
 from __future__ import annotations
 

@@ -17,6 +17,7 @@ from ...errors import CaseError, InputError
 from ...evidence.dependent import dependent_of, robot_size
 from ...path.arcs import PLANES
 from ...path.path import ProgrammedPath
+from ..statement.chosen_settings import with_settings
 from .path_closing import unknowns_at
 from .robot.long_turns import turns_of_path
 from .robot.path_cover import PathCover
@@ -77,7 +78,7 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
         NotJudgedError: the robot cannot be judged, or its loops are not closed at the first point.
     """
     first = cover.points(cover.pieces[:1], 0.0)[0]
-    near = partial(unknowns_at, at_first_settings(case, box, first), closed, box.pose(first))
+    near = partial(unknowns_at, at_settings(case, box, first), closed, box.pose(first))
     design = replace(build_problem(case, closed.model, box, first, near), cover=cover)
     # An equation whose coordinate hardly changes counts as dependent on other equations, but must be satisfied.
     if not np.array_equal(design.start[design.stated], first[[design.free[j] for j in design.stated]]):
@@ -85,18 +86,9 @@ def design_along(case: Case, closed: ClosedForm, box: PoseBox, cover: PathCover)
     return design
 
 
-def at_first_settings(case: Case, box: PoseBox, first: FloatArray) -> Case:
-    """Return the case with the settings at the first point (c,) of a path; unchanged for a path without settings."""
-    if not box.settings:
-        return case
-    values = dict(zip(box.settings, first[box.of_pose :].tolist(), strict=True))
-    parameters = {
-        item.name: [
-            values.get(name, value) for name, value in zip(item.components, case.components(item.name), strict=True)
-        ]
-        for item in case.model.parameters
-    }
-    return replace(case, parameters=parameters)
+def at_settings(case: Case, box: PoseBox, at: FloatArray) -> Case:
+    """Return the case with the settings at a point (c,) of a path; unchanged for a path without settings."""
+    return with_settings(case, dict(zip(box.settings, at[box.of_pose :].tolist(), strict=True)))
 
 
 def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[PoseBox, Workspace]:
@@ -107,6 +99,8 @@ def with_dependent(case: Case, box: PoseBox, workspace: Workspace) -> tuple[Pose
     """
     if workspace.turns.kind is not TurnKind.ROLL_PITCH_YAW:
         return box, workspace
+    # The settings in the middle of their ranges: dependent coordinates are refused while settings change.
+    case = at_settings(case, box, 0.5 * box.lower + 0.5 * box.upper)
     try:
         found = dependent_of(case, workspace)
     except CaseError as error:

@@ -27,7 +27,7 @@ from ...path.path import Poses
 from ...path.sampling import Points, spread_points, twists_at
 from ...program.layout import robot_length
 from ..statement.claims import Claim, searched_claims
-from ..statement.motors import in_motion, motor_claims, speed_claims
+from ..statement.motors import in_path_motion, motor_claims, speed_claims
 from .judgement import Judgement
 from .numbers.expressions import Expressions
 from .numbers.motors import Motors
@@ -127,7 +127,7 @@ def samples_of(judged: Judgement, most: int = MOST_POINTS) -> PathSamples:
         most: number of points to spread over the path.
     """
     path, case = judged.path, replace(judged.case, joint_centre_tolerance=None)
-    case = in_motion(case) if path.is_timed else case
+    case = in_path_motion(case) if path.is_timed else case
     points = spread_points(path, most, [(each.segment, each.parameter) for each in places_of(judged)])
     poses = path.poses_at(*points)
     try:

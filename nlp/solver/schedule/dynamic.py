@@ -219,10 +219,7 @@ def _periodic(problem: ScheduleProblem, grid: Grid) -> FloatArray | None:
     if free is None:
         return None
     low, high = sorted(int(np.searchsorted(grid.values, each)) for each in (free[0], free[-1]))
-    tried = np.concatenate(
-        [np.linspace(low, high, 9), np.linspace(0, len(grid.values) - 1, 16), _middle(problem, grid)]
-    )
-    tried = np.unique(tried.astype(int))
+    tried = np.unique(np.concatenate([np.linspace(low, high, 9), np.linspace(0, len(grid.values) - 1, 16)]).astype(int))
     best, most = None, _OUT
     for m in tried.tolist():
         found = best_path(grid, is_worst=problem.is_worst, first=m, last=m)
@@ -233,20 +230,6 @@ def _periodic(problem: ScheduleProblem, grid: Grid) -> FloatArray | None:
         if value > most:
             best, most = found, value
     return best
-
-
-def _middle(problem: ScheduleProblem, grid: Grid) -> list[int]:
-    """Return the grid values at both ends of the second of three rounds; far from its ends a long schedule repeats."""
-    last, rounds = len(grid.stages) - 1, 3
-    long = Grid(
-        np.arange(rounds * last + 1),
-        grid.values,
-        np.concatenate([*[grid.objective[:-1]] * rounds, grid.objective[-1:]]),
-        np.tile(grid.reach, rounds),
-        np.concatenate([*[grid.weights[:-1]] * rounds, grid.weights[-1:]]),
-    )
-    found = best_path(long, is_worst=problem.is_worst)
-    return [] if found is None else np.searchsorted(grid.values, found[[last, 2 * last]]).tolist()
 
 
 def constants(problem: ScheduleProblem, d: FloatArray, *, fine: bool = True, most: int = 3) -> list[FloatArray]:

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 #: Margins of the limits at added and at all other points, relative to the limits, as a limit that is exactly reached
 #: cannot be proved; and gap of the proofs.
 _MARGIN, _LEAST, _GAP = 1e-4, 2e-6, 1e-4
+#: Largest margin of strokes, relative to them.
+_LARGEST = 1e-3
 #: Largest number of proofs.
 _MOST = 12
 #: Fractions of the way between two points at which limits are sampled for further places.
@@ -66,9 +68,9 @@ def exchanged(problem: ScheduleProblem, schedule: Polished) -> ProvedSchedule:
     for _ in range(_MOST):
         added = len(problem.points) - first
         places = [] if judged.is_proved or is_requested() else _places(problem, schedule, judged)
-        if not places:
+        finer, own = _with_points(problem, path, schedule, places) if places else (_tighter(problem), schedule.s)
+        if finer is None or judged.is_proved or is_requested():
             return ProvedSchedule(problem, schedule, judged, added)
-        finer, own = _with_points(problem, path, schedule, places)
         found = polish(finer, schedule.d, own)
         if found is None:
             return ProvedSchedule(problem, schedule, judged, added)
@@ -93,6 +95,13 @@ def _with_points(
     margins[known] = _LEAST if problem.margins is None else problem.margins
     refined = replace(problem, points=finer, margins=margins)
     return refined, within_rates(refined, own)
+
+
+def _tighter(problem: ScheduleProblem) -> ScheduleProblem | None:
+    """Return the problem with a larger margin of its strokes, which have no place on the path; None at the largest."""
+    if not problem.extents or problem.extent_margin >= _LARGEST:
+        return None
+    return replace(problem, extent_margin=max(2 * problem.extent_margin, _MARGIN))
 
 
 def _judged(problem: ScheduleProblem, schedule: Polished, path: ProgrammedPath) -> Judgement:

@@ -82,7 +82,8 @@ def _search(
     rows = 1 if constant else count
     centre, half = _scales(problem)
     levels = 1 if goal == "level" else count if problem.has_levels else 0
-    x = MX.sym("x", n + rows * k + levels)
+    at_levels, at_extents = n + rows * k, n + rows * k + levels
+    x = MX.sym("x", at_extents + 2 * len(problem.extents))
     design = ca.DM(centre[:n]) + ca.DM(half[:n]) * x[:n] if n else MX(0, 1)
     own = ca.reshape(x[n : n + rows * k], k, rows)
     own = ca.repmat(ca.DM(centre[n:]), 1, rows) + ca.repmat(ca.DM(half[n:]), 1, rows) * own
@@ -106,7 +107,7 @@ def _search(
         least = -math.inf if at_least is None else at_least / size
         x0 = np.append(x0, np.maximum((start if levels > 1 else start.min(keepdims=True)) / size, least))
         lbx, ubx = np.append(lbx, [least] * levels), np.append(ubx, [math.inf] * levels)
-        t = x[n + rows * k :]
+        t = x[at_levels:at_extents]
         g.append(_above_levels(weighted / size, t))
         low, high = low + [0.0] * (T * count), high + [math.inf] * (T * count)
         objective = -ca.dot(t, ca.DM(problem.points.weights)) if levels > 1 else -t
@@ -115,19 +116,63 @@ def _search(
         if at_least is not None:
             g.append(ca.vec(weighted) / size)
             low, high = low + [at_least / size] * (T * count), high + [math.inf] * (T * count)
+    if problem.extents:
+        extents = _extent_rows(problem, d, s, ca.repmat(design, 1, count), S, x[at_extents:])
+        g.append(extents.rows)
+        low, high = low + [-math.inf] * extents.rows.numel(), high + [0.0] * extents.rows.numel()
+        x0 = np.append(x0, extents.start)
+        lbx, ubx = (np.append(each, [end] * len(extents.start)) for each, end in ((lbx, -math.inf), (ubx, math.inf)))
     solver = ca.nlpsol("schedule", "ipopt", {"x": x, "f": objective, "g": ca.vertcat(*g)}, _options(near, iterations))
     found = solver(x0=np.clip(x0, lbx, ubx), lbx=lbx, ubx=ubx, lbg=low, ubg=high)
     point = np.clip(found["x"].full().ravel()[: n + rows * k], -1.0, 1.0)
-    new = centre[:n] + half[:n] * point[:n], centre[n:] + half[n:] * point[n:].reshape(rows, k)
+    return _kept(problem, centre[:n] + half[:n] * point[:n], centre[n:] + half[n:] * point[n:].reshape(rows, k))
+
+
+def _kept(problem: ScheduleProblem, d: FloatArray, s: FloatArray) -> Polished | None:
+    """Return a design (n,) and a schedule (N, k), or a constant (1, k), that keeps all limits; None if it does not."""
     low_d, high_d, _ = ends(problem.design)
     low_s, high_s, _ = ends(problem.settings)
-    d_new, s_new = np.clip(new[0], low_d, high_d), np.clip(new[1], low_s, high_s)
+    d_new, s_new = np.clip(d, low_d, high_d), np.clip(s, low_s, high_s)
     if problem.is_periodic:
         s_new[-1] = s_new[0]
-    s_new = np.repeat(s_new, count, axis=0) if constant else within_rates(problem, s_new)
+    count = len(problem.points)
+    s_new = np.repeat(s_new, count, axis=0) if len(s_new) < count else within_rates(problem, s_new)
     if not problem.is_feasible(d_new, s_new):
         return None
     return Polished(d_new, s_new, problem.value(d_new, s_new))
+
+
+class _ExtentRows(NamedTuple):
+    """Rows (r, 1) of limits that compare two points, at most 0, and first values (2 l,) of the extents."""
+
+    rows: MX
+    start: FloatArray
+
+
+def _extent_rows(
+    problem: ScheduleProblem, d: FloatArray, s: FloatArray, design: MX, settings: MX, extents: MX
+) -> _ExtentRows:
+    """Return the rows of limits that compare two points, with the smallest and the largest length as variables.
+
+    Args:
+        problem: the problem.
+        d: (n,) design at the start.
+        s: (N, k) schedule at the start.
+        design: (n, N) design at the points.
+        settings: (k, N) settings at the points.
+        extents: (2 l, 1) smallest lengths, then largest lengths, relative to their sizes.
+    """
+    first, count, half = problem.compared(d, s), len(problem.points), len(problem.extents)
+    size = np.abs(first).mean(axis=0)
+    lengths = problem.lengths_function.map(count)(design, settings, problem.numbers) / ca.repmat(ca.DM(size), 1, count)
+    smallest, largest = extents[:half], extents[half:]
+    rows = [ca.vec(ca.repmat(smallest, 1, count) - lengths), ca.vec(lengths - ca.repmat(largest, 1, count))]
+    rows += [
+        (size[j] * (largest[j] - each.ratio * smallest[j]) - each.most) / abs(each.most) + problem.extent_margin
+        for j, own in enumerate(problem.extents)
+        for each in own
+    ]
+    return _ExtentRows(ca.vertcat(*rows), np.concatenate([first.min(axis=0) / size, first.max(axis=0) / size]))
 
 
 def _above_levels(values: MX, levels: MX) -> MX:

@@ -10,8 +10,8 @@ the place of the sum. The function is mapped over the points, so its expressions
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, lru_cache
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from ....models.values import dataclass
 from ...case.case import Case
 from ...case.choices import check_no_catalogue
 from ...case.forces import forces_at
-from ...case.limits.constraint import NUMBER, BoundedConstraint, Reading
+from ...case.limits.constraint import NUMBER, BoundedConstraint, Extent, Reading
 from ...case.limits.limit import Design, Plate, PlateJoint, PosedRobot
 from ...case.limits.singular_values import smallest_eigenvalue
 from ...case.pathfile import TURN
@@ -45,6 +45,8 @@ from ...proof.statement.fixed_robot import check_moving
 REACH = "reach limb "
 #: Numbers of a point: position, rotation matrix column by column, unit vector of the feed, margin of the limits.
 _POINT = 16
+#: Number of mapped functions that are kept: their construction takes longer than a call with few points.
+_MAPS = 4
 #: Part by which steps between points are smaller than the rates allow, so that written values keep the rates too.
 INSIDE = 1e-9
 #: Rounding of a difference of two settings, relative to the largest setting.
@@ -120,9 +122,12 @@ class ScheduleProblem:
         of_design: (b, 1) limits of the design alone, at most 0.
         loops: (e, 1) left sides of the loop equations, scaled to values of about 1; 0 at poses that the robot can take.
         names: names of the limits.
+        lengths: (l, 1) values at a point of which a limit compares the smallest with the largest one, such as a stroke.
+        extents: limits on each of these values.
         are_exact: (c,) whether each limit is on the quantity of the case; false for a limit on a stricter estimate.
         matrix: (m, 6) homogenised J, if its smallest singular value is the objective; otherwise None.
         margins: (N,) margins by which limits are tighter at the points, relative to their sizes; 0 if left out.
+        extent_margin: margin by which limits that compare points are tighter, relative to their sizes.
     """
 
     case: Case
@@ -136,9 +141,12 @@ class ScheduleProblem:
     of_design: SX
     loops: SX
     names: tuple[str, ...]
+    lengths: SX
+    extents: tuple[tuple[Extent, ...], ...]
     are_exact: tuple[bool, ...]
     matrix: SX | None = None
     margins: FloatArray | None = None
+    extent_margin: float = 0.0
 
     @property
     def sign(self) -> float:
@@ -184,6 +192,11 @@ class ScheduleProblem:
         return ca.Function("point", list(self.symbols), [ca.densify(self.objective), ca.densify(self.limits)])
 
     @cached_property
+    def _mapped(self) -> Callable[[int], ca.Function]:
+        """The function mapped over a number of points; the last maps are kept."""
+        return lru_cache(_MAPS)(self.function.map)
+
+    @cached_property
     def matrix_function(self) -> ca.Function | None:
         """Function of design, settings and the numbers of a point, with the homogenised J (m, 6); None without it."""
         if self.matrix is None:
@@ -200,6 +213,31 @@ class ScheduleProblem:
         found = self.matrix_function.map(count)(design, np.reshape(s, (count, -1)).T, numbers).full()
         return np.asarray(found.reshape(rows, count, columns).transpose(1, 0, 2))
 
+    @cached_property
+    def lengths_function(self) -> ca.Function:
+        """Function of design, settings and the numbers of a point, with the lengths that limits compare."""
+        return ca.Function("lengths", list(self.symbols), [ca.densify(self.lengths)])
+
+    def compared(self, d: FloatArray, s: FloatArray) -> FloatArray:
+        """Return the lengths (N, l) that limits compare, for a design (n,) and settings (N, k)."""
+        count = len(self.points)
+        design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
+        return np.asarray(self.lengths_function.map(count)(design, s.T, self.numbers).full().T)
+
+    def extent_excess(self, d: FloatArray, s: FloatArray) -> float:
+        """Return the largest relative excess over a limit that compares two points; minus infinity without any."""
+        if not self.extents:
+            return -math.inf
+        lengths = self.compared(d, s)
+        excess = [
+            (largest - each.ratio * smallest - each.most) / abs(each.most) + self.extent_margin
+            for own, smallest, largest in zip(
+                self.extents, lengths.min(axis=0).tolist(), lengths.max(axis=0).tolist(), strict=True
+            )
+            for each in own
+        ]
+        return float(max(excess))
+
     def at(
         self, d: FloatArray, s: FloatArray, which: Sequence[int] | None = None, *, estimated: bool = False
     ) -> Values:
@@ -214,7 +252,7 @@ class ScheduleProblem:
         numbers = self.numbers if which is None else self.numbers[:, list(which)]
         count = numbers.shape[1]
         design = np.repeat(np.reshape(d, (-1, 1)), count, axis=1)
-        objective, limits = self.function.map(count)(design, np.reshape(s, (count, -1)).T, numbers)
+        objective, limits = self._mapped(count)(design, np.reshape(s, (count, -1)).T, numbers)
         values, matrices = objective.full().T, None if estimated else self.matrices(d, s, numbers)
         if matrices is not None:
             regular = np.isfinite(matrices).all(axis=(1, 2))
@@ -255,6 +293,7 @@ class ScheduleProblem:
             and (values.excess <= slack).all()
             and (self.gaps(d, s) <= _CLOSED).all()
             and (own <= slack).all()
+            and self.extent_excess(d, s) <= slack
             and (s >= low - rounding).all()
             and (s <= high + rounding).all()
             and (steps <= rounding).all()
@@ -290,11 +329,14 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         closed = eliminated_form(case.model)
     model = closed.model
     if model.unknowns:
-        names = ", ".join(each.description or each.name for each in model.unknowns)
-        fault = f"is not supported along a path for {case.model.name!r}: no closed form of {names}"
+        limbs = _limbs_of_unknowns(case.model, model)
+        fault = (
+            f"is not supported along a path for {case.model.name!r}: no closed form of the passive joints of {limbs}"
+        )
         raise CaseError("objective.as", fault, case.over_path and case.over_path.value, source=case.source)
     _check_feeds(case, points)
     design, settings, parameters, d, s = _variables(case)
+    _check_home(case, settings)
     point = SX.sym("point", _POINT)
     position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
     turned, axis = rotation, SX([0.0, 0.0, 1.0])
@@ -320,6 +362,7 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     rows = [row for row in rows if not _is_bound(row.excess, d, s, [*design, *settings])]
     varying = [bool(ca.depends_on(row.excess, ca.vertcat(s, point))) for row in rows]
     at_points = [row for row, own in zip(rows, varying, strict=True) if own]
+    lengths, extents = _extents(case, robot)
     matrix = _matrix(case, robot)
     values = _values(case, model, robot) if matrix is None else ca.sqrt(smallest_eigenvalue(matrix.T @ matrix))
     weights = [1.0] * values.numel() if case.tasks[0].measure else [task.weight for task in case.tasks]
@@ -335,11 +378,26 @@ def schedule_problem(case: Case) -> ScheduleProblem:
         of_design=ca.vertcat(SX(0, 1), *[row.excess for row, own in zip(rows, varying, strict=True) if not own]),
         loops=robot.loops if model.loops else robot.closure,
         names=tuple(row.name for row in at_points),
+        lengths=lengths,
+        extents=extents,
         are_exact=tuple(row.is_exact for row in at_points),
         matrix=matrix,
     )
     _check_poses(problem)
     return problem
+
+
+def _limbs_of_unknowns(model: Model, left: Model) -> str:
+    """Return the limbs with unknowns that are left, in words.
+
+    Args:
+        model: the robot, whose unknowns are in the order of its chains.
+        left: the robot without the unknowns that have a closed form.
+    """
+    owners = [each.limb for each in model.structure for _ in range(each.unknowns)]
+    names = {each.name for each in left.unknowns}
+    found = dict.fromkeys(limb for each, limb in zip(model.unknowns, owners, strict=True) if each.name in names)
+    return f"limb{'s' * (len(found) > 1)} {', '.join(found)}"
 
 
 def _check_poses(problem: ScheduleProblem) -> None:
@@ -373,6 +431,15 @@ def _check_times(case: Case, points: Waypoints) -> None:
     if limited and len(untimed):
         fault = f"needs the time of every segment, which the path does not state; give {limited[0]} the rate inf,"
         raise CaseError(f"{limited[0]}.rate", f"{fault} or state t or feed in the path", source=case.source)
+
+
+def _check_home(case: Case, settings: Sequence[Variable]) -> None:
+    """Refuse a limit on angles from home while a dimension changes, because home states no value of it."""
+    names = [each.name for each in settings if each.name != TURN]
+    for limit in case.limits:
+        if names and limit.reference == "home":
+            fault = f"home has no {names[0]}, which changes along the path; state mounting axes"
+            raise CaseError(f"limits.{limit.name}.about", fault, "home", case.source)
 
 
 def _check_feeds(case: Case, points: Waypoints) -> None:
@@ -435,6 +502,13 @@ def _values(case: Case, model: Model, robot: RobotInstance) -> SX:
     return ca.vertcat(*[each.value for each in signed_values(case, forces)])
 
 
+def _extents(case: Case, robot: RobotInstance) -> tuple[SX, tuple[tuple[Extent, ...], ...]]:
+    """Return the values (l, 1) at a point that limits compare between points, and the limits on each of them."""
+    pair = Design(case.as_limited, (robot, robot), {})
+    families = [family for limit in case.limits for family in limit.on_pairs(pair)]
+    return ca.vertcat(SX(0, 1), *[each.values[0] for each in families]), tuple(each.extents for each in families)
+
+
 def _matrix(case: Case, robot: RobotInstance) -> SX | None:
     """Return the homogenised J (m, 6) at a point, if its smallest singular value is the objective; otherwise None.
 
@@ -463,9 +537,6 @@ def _limits(case: Case, robot: RobotInstance, parameters: SX) -> list[BoundedCon
     ]
     found: list[BoundedConstraint] = []
     for limit in sorted(case.limits, key=attrgetter("order")):
-        if list(limit.on_pairs(Design(case.as_limited, (robot, robot), design.numbers))):
-            fault = "compares two poses, which is not supported with objective.as"
-            raise CaseError(f"limits.{limit.name}", fault, source=case.source)
         found += [item for plate in plates for item in limit.on_plate(plate)]
         found += [*limit.of_design(design), *limit.at_pose(pose)]
     return found

@@ -39,7 +39,7 @@ export class LimitBars {
 
   /** @param {import("./limits.js").LimitState} each */
   add(each) {
-    const { state } = this, value = make("output", { class: "value" });
+    const { state } = this, value = make("span", { class: "value" });
     const fill = make("i", {}), mark = make("b", {}), bar = make("span", { class: "track" }, fill, mark);
     /** @type {any} */
     let entry = null;

@@ -31,7 +31,7 @@ const limbValues = (view) => {
   /** @type {Map<string, number>} */
   const found = new Map();
   const take = (/** @type {string} */ limb, /** @type {number} */ value) => {
-    if (!(Math.abs(found.get(limb) ?? 0) > Math.abs(value))) found.set(limb, value);
+    if (Number.isFinite(value) && !(Math.abs(found.get(limb) ?? 0) > Math.abs(value))) found.set(limb, value);
   };
   if (kind === "force") {
     const count = data.actuators.length;

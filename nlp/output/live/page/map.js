@@ -303,8 +303,9 @@ export class ValueMap {
     }
     const ends = (/** @type {Slider} */ slider) => this.ends(slider).map((each) => digits(each, 4)).join(" to ");
     const box = ranges[0] && ranges[1] ? "; dashed: the workspace" : "";
+    const shades = low <= high ? `dark ${measured(low, quantity.unit, 5)}, light ${measured(high, quantity.unit, 5)}` : "no point has a robot";
     byId("map-words").textContent =
-      `${first.name} ${ends(first)} across, ${second.name} ${ends(second)} upwards; dark ${measured(low, quantity.unit, 5)}, light ${measured(high, quantity.unit, 5)}; ` +
+      `${first.name} ${ends(first)} across, ${second.name} ${ends(second)} upwards; ${shades}; ` +
       `white lines: borders of limits; dotted: a limit is violated; grey: no robot${box}. First map in ${Math.round(this.took)} ms, now ${count} by ${count} points, other values as they are.`;
   }
 }

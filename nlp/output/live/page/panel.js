@@ -119,7 +119,7 @@ const showTasks = (state) => {
   list.hidden = !values.length;
   values.forEach(({ F, best }, k) => {
     const { name, sense, F_unit } = state.data.tasks[k], row = list.children[k] ?? list.appendChild(make("li", {}));
-    const part = best ? `${digits((100 * F) / best, 4)} % of ` : "";
+    const part = best ? `${digits((100 * F) / best, 4)}\u00a0% of ` : "";
     say(row, `${name}: F = ${measured(F, F_unit)}${best === null ? "" : `, ${part}the separate ${sense}imum ${digits(best)}`}`);
   });
 };

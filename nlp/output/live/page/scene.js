@@ -16,9 +16,9 @@ const PARTS = 6;
 /** Stops of the colours of rates and forces: negative, zero, positive. */
 const STOPS = [[8, 81, 156], [63, 134, 196], [154, 163, 171], [224, 138, 60], [179, 71, 0]];
 
-/** Colour of a value between -1 and 1. @param {number} part */
+/** Colour of a value between -1 and 1; that of zero where there is no value. @param {number} part */
 export const colourOf = (part) => {
-  const at = (Math.max(-1, Math.min(1, part)) + 1) * 2, low = Math.min(3, Math.floor(at)), share = at - low;
+  const at = (Math.max(-1, Math.min(1, Number.isNaN(part) ? 0 : part)) + 1) * 2, low = Math.min(3, Math.floor(at)), share = at - low;
   return `rgb(${STOPS[low].map((each, k) => Math.round(each + share * (STOPS[low + 1][k] - each))).join(",")})`;
 };
 

@@ -1,5 +1,5 @@
 // Schedule along a path: settings at the shown point, the best constant settings beside them, and maps of the objective.
-import { cross, digits, dot, measured, parsed, plus } from "./numbers.js";
+import { cross, digits, dot, measured, parsed, plus, settled } from "./numbers.js";
 import { shade } from "./map.js";
 import { byId, make, say } from "./panel.js";
 import { unpack } from "./text.js";
@@ -21,6 +21,8 @@ import { unpack } from "./text.js";
 
 /** Width and height of a map, pixels, and part of a range that counts as rounding. */
 const WIDTH = 900, HEIGHT = 300, SAME = 1e-9;
+/** Rates below this part of the largest one are rounding of the search. */
+const ROUNDED = 1e-6;
 /** Steps by which closed loops follow a change of the pose. */
 const FOLLOWED = 12;
 /** Forbidden parts of a map. */
@@ -252,7 +254,7 @@ export class Schedule {
   rateWords(k) {
     const { data, index } = this, { name, unit, factor, low, high, rate } = data.settings[k], reach = this.reach(k);
     const per = unit ? `${unit}/s` : "1/s", own = this.isConstant ? 0 : data.rates[index][k], isLast = index === data.rows.length - 1;
-    const now = own === null ? "" : `${isLast ? "rate to this point" : "rate to the next point"} ${measured(own, per, 5)}, `;
+    const now = own === null ? "" : `${isLast ? "rate to this point" : "rate to the next point"} ${measured(settled(own, rate ?? (high - low) * factor, ROUNDED), per, 5)}, `;
     const most = rate === null ? "no largest rate" : `at most ${measured(rate, per, 5)}`;
     if (!reach) return { words: `${now}${most}`, isOut: false };
     const value = this.values()[k], slack = SAME * (high - low), isOut = value < reach[0] - slack || value > reach[1] + slack;

@@ -115,7 +115,9 @@ def _refuse_narrow(robot: PosedRobot, assembly: Assembly, root: PoseRoot) -> Non
         k = robot.free[j]
         for end in (root.lower[k], root.upper[k]):
             to = assembly.start[None].copy()
-            near = _SHORT * (robot.length if k < _POSITION else 1.0)
+            # A dimension that changes along a path may have any unit.
+            turn = 1.0 if k < root.of_pose else max(abs(root.lower[k]), abs(root.upper[k]))
+            near = _SHORT * (robot.length if k < _POSITION else turn)
             to[0, j] = np.clip(end, to[0, j] - near, to[0, j] + near)
             (z,) = assembly.moved(assembly.start[None], to[:, assembly.independent])
             off = np.abs(robot.at(equations, z) - first)

@@ -21,6 +21,7 @@ from ....case.workspace import LARGEST_TURN, TurnKind, Turns, Workspace
 from ....errors import CaseError
 from ....evidence.dependent import dependent_of, robot_size
 from ....path.path import ProgrammedPath
+from ...statement.chosen_settings import with_settings
 from ..bisection import Shown, show
 from ..polynomials import Polynomial
 from ..proof_file import ProofError
@@ -65,7 +66,11 @@ class PathRoot:
         low, high = self.poses.ranges()
         self.of_pose, self.settings = self.poses.of_pose, self.poses.settings
         of_pose = slice(self.of_pose)
-        self.workspace = _workspace(case, low[of_pose], high[of_pose], is_tangents=self.poses.is_tangents)
+        middle = (0.5 * low + 0.5 * high)[self.of_pose :].tolist()
+        resting = with_settings(case, dict(zip(self.settings, middle, strict=True)))
+        self.workspace = _workspace(resting, low[of_pose], high[of_pose], is_tangents=self.poses.is_tangents)
+        if self.workspace.dependent and self.settings:
+            raise ProofError("dependent coordinates of the pose are not checked while dimensions change along the path")
         following, varying = [each.index for each in self.workspace.dependent], self.poses.varying
         for each in self.workspace.dependent:
             k, ends = each.index, (each.lower, each.upper)

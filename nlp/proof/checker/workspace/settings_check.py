@@ -14,8 +14,9 @@ import numpy as np
 from ....case.case import Case
 from ....case.pose import Free, ends_of
 from ....case.workspace import TurnKind, Workspace
+from ....errors import CaseError
 from ...statement.chosen_settings import SETTINGS, part_of, ranges_of_settings, with_settings
-from ...statement.claims import Claim, ClaimKind
+from ...statement.claims import Claim, ClaimKind, searched_claims
 from ...statement.fixed_robot import workspace_of_case
 from ..proof_file import Premises, Proof, ProofClaim, ProofError
 from ..tree import Node, TreeReader, wrong_node
@@ -51,17 +52,29 @@ def check_settings_proof(proof: Proof, case: Case) -> VerifiedWorkspace:
         raise ProofError("settings are proved only for robots without dependent pose coordinates")
     leaves = pieces = 0
     for part, values in _boxes(proof.claims[0], workspace, ranges):
-        checker = _BoxChecker(with_settings(case, values), part)
-        for each in checker.expected:
-            try:
-                checker.check(each, checker.given(each))
-            except ProofError as error:
-                shown = ", ".join(f"{case.parameter_name(name)} = {value:.10g}" for name, value in values.items())
-                ends = zip(*map(ends_of, (*part.position, *part.turns.angles)), strict=True)
-                where = f"in the box {box_words(*map(np.array, ends))} with {shown}"
-                raise ProofError(f"{each.name} {each.sense}".rstrip() + f", {where}: {error}") from None
-        leaves, pieces = leaves + 1, pieces + checker.pieces
+        leaves, pieces = leaves + 1, pieces + _pieces_of(case, part, values)
     return VerifiedWorkspace((CheckedClaim(SETTINGS, ""),), "", workspace, leaves, pieces)
+
+
+def _pieces_of(case: Case, workspace: Workspace, values: dict[str, float]) -> int:
+    """Prove the ranks and limits of a robot with fixed settings over a box, and return the number of examined boxes.
+
+    Raises:
+        ProofError: a rank or a limit could not be proved; the message names it.
+    """
+    whose = ""
+    try:
+        checker = BoxChecker(with_settings(case, values), workspace)
+        for each in checker.expected:
+            whose = f"{' '.join(each.label).strip()}, "
+            checker.check(each, checker.given(each))
+    except (CaseError, ProofError) as error:
+        kinds = {name: item.dimension for item in case.model.parameters for name in item.components}
+        numbers = (f"{case.parameter_name(k)} = {case.units.shown(v, kinds[k]):.10g}" for k, v in values.items())
+        ends = zip(*map(ends_of, (*workspace.position, *workspace.turns.angles)), strict=True)
+        where = f"in the box {box_words(*map(np.array, ends))} with {', '.join(numbers)}"
+        raise ProofError(f"{whose}{where}: {error}") from None
+    return checker.pieces
 
 
 def _boxes(
@@ -95,13 +108,20 @@ def _boxes(
         raise ProofError("the proof states values of the settings for more boxes than it has")
 
 
-class _BoxChecker(WorkspaceChecker):
-    """Check of the ranks and limits of a robot with fixed dimensions over a box of poses, by bisection."""
+class BoxChecker(WorkspaceChecker):
+    """Check of the ranks and limits of a robot with fixed dimensions over a box of poses, by bisection.
+
+    Raises:
+        ProofError: the checker has no rule for a limit of the case.
+    """
 
     def __init__(self, case: Case, workspace: Workspace) -> None:
         robot = followed_claims(case, workspace)
         every = expected_claims(case, robot, (), 0.0)
         self.expected: list[Claim] = [each for each in every if each.kind is ClaimKind.RANK or each.limit is not None]
+        known = {each.label for each in self.expected}
+        for each in (each for each in searched_claims(case) if each.limit is not None and each.label not in known):
+            raise ProofError(f"the checker has no rule for {each.name} of this robot")
         claims = tuple(map(self.given, self.expected))
         premises = Premises((), (), (), 0.0)
         self._begin(Proof("", case.name, premises, claims), case, pose_root(workspace), robot, workspace)
