@@ -87,7 +87,7 @@ def draw_optimum() -> None:
     assert certificate is not None  # noqa: S101 - a script of the documentation
     start = evaluate(best.nlp, best.nlp.start)
     top, radius = certificate.bound, float(np.ravel(evaluate(best.nlp, best.x).parameters["x1"])[0])
-    curve = tradeoff(lambda value: load_case(name, {"x1": value}), [*radii, radius + 1e-3], name="x1").points
+    curve = tradeoff(load_case(name), {"x1": [*radii, radius + 1e-3]}).points
     kept = sorted((point.value, point.solution.F) for point in curve if point.solution.status is Status.OPTIMAL)
     figure = Figure(figsize=(11.0, 5.2), facecolor="white")
     FigureCanvasAgg(figure)
