@@ -16,8 +16,9 @@ import numpy as np
 from screwsynth.models import FloatArray
 from screwsynth.nlp import Case, Free, load_case
 from screwsynth.nlp.solver.schedule.cells import cell_bound
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.schedule.polish import polish
-from screwsynth.nlp.solver.schedule.problem import ScheduleProblem, ends, schedule_problem
+from screwsynth.nlp.solver.schedule.problem import ScheduleProblem, ends
 from screwsynth.nlp.solver.schedule.search import solve_schedule
 
 #: Relative gaps to which bounds are proved.

@@ -20,7 +20,8 @@ from ...models import Dimension, FloatArray
 from ..case.case import Case
 from ..errors import CaseError, listing
 from ..solver.schedule.dynamic import sliding_maximum
-from ..solver.schedule.problem import ScheduleProblem, schedule_problem
+from ..solver.schedule.formulation import schedule_problem
+from ..solver.schedule.problem import ScheduleProblem
 from ..system.markdown import markdown_text
 from .ctext import comment_text, identifier
 from .templates import fill_template

@@ -21,7 +21,7 @@ from screwsynth.nlp.path.reader import read_path
 from screwsynth.nlp.path.settings import changing_of
 from screwsynth.nlp.proof.workspace.path_judge import judge_path
 from screwsynth.nlp.results.schema import result_schema
-from screwsynth.nlp.solver.schedule.problem import schedule_problem
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.scheduled import Schedule
 
 RAIL, RATE = 0.2, 0.1

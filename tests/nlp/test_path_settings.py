@@ -32,8 +32,8 @@ from screwsynth.nlp.proof.workspace.path_proof_writer import path_proof_of
 from screwsynth.nlp.proof.workspace.path_samples import samples_of
 from screwsynth.nlp.proof.workspace.proof_record import ProofRecord
 from screwsynth.nlp.solver.schedule.exchange import exchanged
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.schedule.polish import polish
-from screwsynth.nlp.solver.schedule.problem import schedule_problem
 
 #: Points of a path with a turn about a tool that leans: position, roll, pitch, yaw, turn (degrees), time.
 TURN_ROWS = ((0, 0, 20, 10, 20, 0, -40, 0), (3, 1, 21, 0, 25, 30, 35, 4), (2, 3, 20, -15, 10, 10, 60, 8))

@@ -19,8 +19,8 @@ from screwsynth.nlp import CaseError, load_case
 from screwsynth.nlp.path.path import Poses
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.schedule.cells import cell_bound
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.schedule.polish import polish
-from screwsynth.nlp.solver.schedule.problem import schedule_problem
 from screwsynth.nlp.solver.schedule.search import solve_schedule
 
 _LENGTH = 10.0

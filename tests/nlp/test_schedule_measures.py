@@ -16,7 +16,7 @@ from screwsynth.nlp import load_case, solve
 from screwsynth.nlp.path.path import Poses
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.schedule.dynamic import grid_of
-from screwsynth.nlp.solver.schedule.problem import schedule_problem
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 
 _NO_TASK, _INCHES = _STRUT[0], ('length = "in"', 'length = "in"\nforce = "lbf"')
 _LIMITS = "[limits]\nleg_length = { min = 17, max = 43 }"

@@ -13,7 +13,8 @@ from generated import COMPILERS, STRICT, made, needs_compiler, run
 from screwsynth.nlp import CaseError, load_case
 from screwsynth.nlp.embedding.ctext import identifier
 from screwsynth.nlp.embedding.schedulec import FORBIDDEN, StepTables, schedule_c, step_tables
-from screwsynth.nlp.solver.schedule.problem import ScheduleProblem, schedule_problem
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
+from screwsynth.nlp.solver.schedule.problem import ScheduleProblem
 
 NAME = "hexapod-yaw"
 #: The best mean F of all schedules, and the bound of its cells.

@@ -27,8 +27,9 @@ from screwsynth.nlp.path.waypoints import waypoints
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.schedule.cells import cell_bound
 from screwsynth.nlp.solver.schedule.dynamic import Grid, best_path, seeds, sliding_maximum
+from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.schedule.polish import polish
-from screwsynth.nlp.solver.schedule.problem import ScheduleProblem, schedule_problem
+from screwsynth.nlp.solver.schedule.problem import ScheduleProblem
 from screwsynth.nlp.system.jsonvalues import json_data
 
 _DEGREE = math.pi / 180

@@ -7,7 +7,7 @@ import gzip
 import math
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from string import Template
@@ -16,29 +16,26 @@ from typing import Any
 import numpy as np
 
 from ....models import FloatArray
-from ...case.case import Case
 from ...errors import EvaluationError, InputError
 from ...evidence.evaluation import starting_point
 from ...evidence.state import evaluate
 from ...program.formulation import formulate
 from ...program.nlp import Nlp
 from ...program.places import FreeRotation
-from ...results.data import OutcomeData, SolveResult
-from ...results.objective import unit_of_objective
-from ...results.result import result_of
 from ...solver.solution import Solution
-from ...view.data import ViewData, view_data
+from ...view.data import view_data
 from ...view.source import ViewSource
 from ...view.wasm import compile_module
-from ...words.lines import headline, task_lines, title_line
-from ...words.numbers import number
+from ...words.lines import title_line
 from ...words.text import Line
 from ..pictures.drawing import Drawing, drawing_of
 from ..pictures.posture import Posture
 from ..pictures.view import clearest_view
 from ..report.frames import joint_data, link_data, postures_along_motion
-from ..report.markup import Markup, join_markup, paragraphs, script_json, tag
+from ..report.markup import Markup, script_json, tag
 from .casefile import case_parts, stated_tasks
+from .controls import body_of, footer_of
+from .headline import answer_of, headline_of, name_of_objective, task_markup, task_of
 
 #: Modules of the page in the order of their imports.
 SCRIPTS = (
@@ -168,7 +165,7 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     case = nlp.case
     module, fault = _module(source)
     data = view_data(source)
-    answer = None if solution is None else _answer(solution)
+    answer = None if solution is None else answer_of(solution)
     start = starting_point(nlp) if track is None else track.x
     x = start if answer is None else np.array(answer["x"])
     drawing = _drawing(nlp, x)
@@ -187,7 +184,7 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
         "start": start.tolist(),
         "answer": answer,
         "statuses": list(_STATUSES),
-        "F_name": _name_of_F(case),
+        "F_name": name_of_objective(case),
         "is_stated": case.tasks[0].is_stated,
         "command": shlex.quote(command),
         "case_parts": case_parts(
@@ -204,10 +201,10 @@ def live_parts(source: ViewSource, solution: Solution | None, command: str, trac
     return LiveParts(
         style=Markup(_file("live.css")),
         heading=tag("h1", title_line(case).words),
-        task=_task(case, solution) if track is None else _task_markup(track.task),
-        answer=_headline(nlp, x, answer, track, has_module=bool(module)),
-        body=_body(case, data, drawing, fault),
-        footer=_footer(source, module),
+        task=task_of(case, solution) if track is None else task_markup(track.task),
+        answer=headline_of(nlp, x, answer, None if track is None else track.answer, has_module=bool(module)),
+        body=body_of(case, data, drawing, fault),
+        footer=footer_of(source, module),
         data=script_json(page),
         module=base64.b64encode(gzip.compress(module, mtime=0)).decode("ascii") if module else "",
         script=Markup(script_text()),
@@ -233,97 +230,6 @@ def script_text(names: Sequence[str] = SCRIPTS) -> str:
 
 def _file(name: str) -> str:
     return (files("screwsynth.nlp.output.live") / "page" / name).read_text(encoding="utf-8")
-
-
-def _name_of_F(case: Case) -> str:  # noqa: N802 - the objective's name
-    """Return the name of the objective in the headline."""
-    if len(case.tasks) > 1:
-        return case.method.value
-    return "F" if case.pose_count == 1 else f"F ({case.over_poses.value} over {case.pose_count} poses)"
-
-
-def _answer(solution: Solution) -> dict[str, Any]:
-    """Return the program's answer: point, words of the terminal's headline, and whether it is an optimum."""
-    combination = solution.combination
-    own = solution.outcomes[0].own if combination is None else combination.combined
-    x = solution.x if own is None else own.x
-    result = result_of(solution)
-    found: dict[str, Any] = {"x": x.tolist(), "isOptimum": solution.status.is_answer, "optima": [], "tasks": []}
-    if isinstance(result, SolveResult):
-        return {**found, "words": headline(result, solution.case).words}
-    method, value = solution.case.method.value, result.combined.value
-    words = f"tasks combined by {method}" if value is None else f"{method} = {number(value)}"
-    units = [unit_of_objective(solution.case, k) for k in range(len(result.combined.tasks))]
-    return {
-        **found,
-        "words": f"{words}   ({solution.status.value})",
-        "optima": [each.best for each in result.combined.tasks],
-        "tasks": [_task_words(each, unit) for each, unit in zip(result.combined.tasks, units, strict=True)],
-    }
-
-
-def _task_words(task: OutcomeData, unit: str) -> str:
-    """Return F of one of several tasks as a part of its separate optimum; ``panel.js`` writes it after a change."""
-    if task.F is None:
-        return f"{task.name}: no F"
-    words = f"{task.name}: F = {number(task.F)} {unit}".rstrip()
-    if task.best is None:
-        return words
-    part = f"{100 * task.F / task.best:.4g}\N{NO-BREAK SPACE}% of " if task.best else ""
-    return f"{words}, {part}the separate {task.sense.value}imum {number(task.best)}"
-
-
-def _headline(
-    nlp: Nlp, x: FloatArray, answer: dict[str, Any] | None, track: Track | None, *, has_module: bool
-) -> Markup:
-    """Return the headline of an answer, of a track or, without both and without a module, of the shown point."""
-    if answer is not None:
-        return _answer_markup(answer["words"], answer["tasks"])
-    if track is not None:
-        return _answer_markup(track.answer)
-    return _answer_markup("") if has_module else _value_markup(nlp, x)
-
-
-def _answer_markup(words: str, tasks: Sequence[str] = ()) -> Markup:
-    """Return the content of the headline, with words for each of several tasks; the script fills it after a change."""
-    return join_markup(
-        [
-            tag("span", words, id="F"),
-            tag("span", id="word"),
-            tag("span", id="words"),
-            tag("ul", *(tag("li", each) for each in tasks), id="task-values", hidden=not tasks),
-        ]
-    )
-
-
-def _value_markup(nlp: Nlp, x: FloatArray) -> Markup:
-    """Return the headline of a page without an answer and without a module: the objective at the shown point."""
-    F = float(np.ravel(nlp.program.kernels.derivatives(x, nlp.arguments).F)[0])
-    words = f"{_name_of_F(nlp.case)} = {number(F)} {unit_of_objective(nlp.case)}".rstrip()
-    if len(nlp.case.tasks) > 1 or not math.isfinite(F):
-        words = ""
-    return join_markup(
-        [
-            tag("span", words, id="F"),
-            tag("span", "point", id="word"),
-            tag("span", "nothing is optimised", id="words"),
-            tag("ul", id="task-values", hidden=True),
-        ]
-    )
-
-
-def _task(case: Case, solution: Solution | None) -> Markup:
-    """Return the task in words."""
-    result = None if solution is None else result_of(solution)
-    lines: list[Line] = []
-    if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
-        lines = [*task_lines(result.robot.task, case.units)]
-    return _task_markup(lines)
-
-
-def _task_markup(lines: Sequence[Line]) -> Markup:
-    """Return the place of the task in words."""
-    return tag("div", paragraphs(lines), class_="task", id="stated-task")
 
 
 def _drawing(nlp: Nlp, x: FloatArray) -> Drawing:
@@ -401,169 +307,3 @@ def _view(source: ViewSource, x: FloatArray) -> list[float]:
     inputs = functions.inputs(x, nlp.arguments).full().ravel()[: functions.view.numel_in(0)]
     values = functions.view(inputs).full().ravel()
     return [float(each) if np.isfinite(each) else 0.0 for each in values]
-
-
-def _body(case: Case, data: ViewData, drawing: Drawing, fault: str) -> Markup:
-    """Return the picture and the controls."""
-    stated = drawing.case is not None and case.tasks[0].is_stated
-    choices = [("rate 0", "rate of the shown task")] if case.changes and stated else []
-    if not case.changes:
-        choices = [(f"rate {k}", f"rate, {task['name']}") for k, task in enumerate(data["tasks"]) if stated]
-    choices += [(f"force {k}", f"actuator force, {name}") for k, name in enumerate(data["loads"])]
-    options = [tag("option", words, value=value) for value, words in choices or [("rate 0", "rate")]]
-    poses = [tag("option", words, value=k) for k, words in enumerate(_pose_words(data))]
-    words = "Robot in three dimensions. Arrow keys turn it, plus and minus zoom, 0 resets the view."
-    picture = tag(
-        "figure",
-        tag("canvas", id="robot", tabindex="0", role="img", aria_label=words),
-        tag(
-            "figcaption",
-            tag("label", "Colour of limbs: ", tag("select", *options, id="colour")),
-            tag(
-                "span",
-                tag("span", class_="scale", aria_hidden="true"),
-                tag("span", "blue negative, orange positive"),
-                class_="together",
-            ),
-            tag("label", "Shown: ", tag("select", *poses, id="pose")) if len(poses) > 1 else None,
-            *_players(case),
-            tag("button", "Reset view", type="button", id="view-reset"),
-            tag("button", "Fit", type="button", id="view-fit"),
-            tag("span", _legend(stated=stated), class_="extra") if stated else None,
-        ),
-        id="picture",
-    )
-    return join_markup([picture, tag("div", *_controls(data, fault), id="controls", tabindex="-1"), _values(data)])
-
-
-def _pose_words(data: ViewData) -> list[str]:
-    """Return the name of each pose: that of its task, if dimensions or the pose change from task to task."""
-    tasks = data["pose_tasks"]
-    if not tasks:
-        return [f"pose {k + 1}" for k in range(data["poses"])]
-    names = [data["tasks"][task]["name"] for task in tasks]
-    if len(set(tasks)) == len(tasks):
-        return names
-    return [
-        f"{name}, pose {tasks[: k + 1].count(task)}" for k, (name, task) in enumerate(zip(names, tasks, strict=True))
-    ]
-
-
-def _players(case: Case) -> Iterable[Markup]:
-    """Yield the buttons that play the motion of each task; the script shows them if the robot can follow it."""
-    for k, task in enumerate(case.tasks):
-        if task.is_stated:
-            words = "Play motion" if len(case.tasks) == 1 else f"Play {task.name}"
-            yield tag("button", words, type="button", class_="play", data_play=k, aria_pressed="false", hidden=True)
-
-
-def _legend(*, stated: bool) -> str:
-    return "Straight arrow: axis of the task. Purple: its pitch, and velocities of the platform." if stated else ""
-
-
-def _controls(data: ViewData, fault: str) -> list[Markup]:
-    """Return the controls beside the picture."""
-    if fault:
-        return [tag("p", f"The sliders of this page do not work: {fault}.", class_="warning")]
-
-    def button(key: str, words: str, **more: object) -> Markup:
-        return tag("button", words, type="button", id=key, **more)
-
-    modes = tag(
-        "div",
-        button("mode-solve", "Solve", aria_pressed="true"),
-        button("mode-evaluate", "Evaluate", aria_pressed="false"),
-        tag("span", class_="gap"),
-        button("to-answer", "Program's answer"),
-        button("to-start", "Start"),
-        button("to-next", "Next optimum"),
-        button("free-all", "Release all"),
-        class_="controls",
-        role="group",
-        aria_label="Mode and points",
-    )
-    note = "A moved value is held, the others are solved for. Thin bars: change of F over each range."
-    tasks = tag("details", tag("summary", "Task"), tag("div", id="tasks"), id="tasks-group", hidden=True)
-    groups = [
-        tag("section", tag("h2", words), tag("div", id=f"{key}s"), id=f"{key}-group")
-        for key, words in (("dimension", "Dimensions"), ("pose", "Pose"))
-    ]
-    copies = tag(
-        "div",
-        button("copy-set", "Copy command"),
-        button("copy-case", "Copy case file"),
-        button("copy-link", "Copy link"),
-        class_="controls",
-    )
-    copied = tag(
-        "div",
-        tag("label", "Text", id="copied-words", for_="copied-text"),
-        tag("textarea", id="copied-text", readonly=True, spellcheck="false"),
-        id="copied",
-        hidden=True,
-    )
-    content = [modes, tag("p", note, class_="note"), *groups, tasks, copies, copied]
-    notice = [tag("p", f"In this page {data['notice']}.", class_="note")] if data["notice"] else []
-    return [tag("div", *notice, *content, class_="needs-module")]
-
-
-def _values(data: ViewData) -> Markup:
-    """Return the places of limits, singular values, rotation, forces and speeds at the point."""
-    values = tag(
-        "dl",
-        *(
-            tag("div", tag("dt", words), tag("dd", id=key), id=f"{key}-row")
-            for key, words in (
-                ("rank", "rank of J"),
-                ("singular", "smallest singular value"),
-                ("turn", "rotation"),
-                ("time", "last change"),
-            )
-        ),
-    )
-    limits = tag("section", tag("h2", "Limits"), tag("div", id="limits"), id="limits-group")
-    track = tag("section", id="track", aria_label="Actuators at this point of the path")
-    return tag("div", track, values, _actuators(data), limits, _map(), id="values", class_="needs-module")
-
-
-def _map() -> Markup:
-    """Return the place of a map over two values."""
-    whats = [tag("option", words, value=key) for key, words in (("F", "F"), ("singular", "smallest singular value"))]
-    choices = tag(
-        "div",
-        tag("label", "Value: ", tag("select", *whats, id="map-what")),
-        tag("label", "across: ", tag("select", id="map-x")),
-        tag("label", "upwards: ", tag("select", id="map-y")),
-        class_="controls",
-    )
-    picture = tag("canvas", id="map", role="img", aria_label="Map of a value over two sliders; a click moves there")
-    words = tag("p", id="map-words", class_="note")
-    return tag("details", tag("summary", "Map"), choices, picture, words, id="map-group")
-
-
-def _actuators(data: ViewData) -> Markup:
-    """Return the table of actuator forces and speeds; empty without loads and speeds."""
-    if "largest" not in data["blocks"]:
-        return Markup("")
-    forces, speeds = ({each[key] for each in data["actuators"]} for key in ("force", "speed"))
-    heads = ["actuator", *(f"{name}, {_one(forces)}" for name in data["loads"])]
-    heads += [f"speed, {_one(speeds)}"] if data["blocks"]["speeds"][1] else []
-    head = tag("thead", tag("tr", *(tag("th", words, scope="col") for words in heads)))
-    table = tag("table", tag("caption", "Actuator forces and speeds"), head, tag("tbody", id="actuators"))
-    return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label="Actuator forces and speeds")
-
-
-def _one(units: Sequence[str] | set[str]) -> str:
-    """Return the common unit; several units one after the other."""
-    return " or ".join(sorted(units))
-
-
-def _footer(source: ViewSource, module: bytes) -> Markup:
-    """Return the origin of the values of the page."""
-    if not module:
-        return tag("p", "Made by screwsynth.")
-    words = (
-        "Made by screwsynth. Values after a change are computed in this page by the C that "
-        "screwsynth codegen writes, compiled to WebAssembly; SHA-256 of the C: "
-    )
-    return tag("p", words, tag("code", source.checksum[:16]), ".")

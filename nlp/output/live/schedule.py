@@ -20,7 +20,8 @@ from ...program.nlp import Nlp
 from ...results.objective import unit_of_objective
 from ...results.schedule import schedule_data
 from ...solver.schedule.dynamic import grid_of
-from ...solver.schedule.problem import ScheduleProblem, schedule_problem
+from ...solver.schedule.formulation import schedule_problem
+from ...solver.schedule.problem import ScheduleProblem
 from ...solver.schedule.search import at_point
 from ...solver.solution import Solution
 from ...view.source import view_or_drawing

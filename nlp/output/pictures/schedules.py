@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ....models import FloatArray
 from ...solver.schedule.dynamic import grid_of
-from ...solver.schedule.problem import schedule_problem
+from ...solver.schedule.formulation import schedule_problem
 from ...words.schedule import objective_name
 from .canvas import INK, RED
 from .curves import draw_frame, draw_grid

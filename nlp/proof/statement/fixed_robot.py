@@ -12,7 +12,6 @@ from ....models import FloatArray, Model, frozen_array
 from ....models.model import joint_parameter
 from ...case.case import Case
 from ...case.checks import check_determined_joints
-from ...case.limits.joints import JointAngle, MountingPose
 from ...case.pose import Free
 from ...case.workspace import Workspace
 from ...errors import CaseError, InputError
@@ -101,9 +100,22 @@ def check_moving(case: Case, names: Sequence[str]) -> None:
     if not (has_straight_legs(case.model) or all(name in joints for name in names)):
         fault = f"{case.model.name} is not a robot with six straight legs, for which alone this is proved"
         raise CaseError(f"robot.parameters.{first}.per", f"{fault}; give the drive as a joint", "path", case.source)
+    check_home(case, [first])
+
+
+def check_home(case: Case, names: Sequence[str]) -> None:
+    """Refuse a limit about home while dimensions change along a path, because home states no values of them.
+
+    Args:
+        case: the case.
+        names: names of the dimensions that change, as messages show them.
+
+    Raises:
+        CaseError: a limit is about home, and a dimension changes.
+    """
     for limit in case.limits:
-        if isinstance(limit, JointAngle) and isinstance(limit.about, MountingPose):
-            fault = f"home has no {first}, which changes along the path; state mounting axes"
+        if names and limit.reference == "home":
+            fault = f"home has no {names[0]}, which changes along the path; state mounting axes"
             raise CaseError(f"limits.{limit.key}.about", fault, "home", case.source)
 
 

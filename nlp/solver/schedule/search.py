@@ -32,8 +32,9 @@ from ..status import Status
 from .cells import CellBound, cell_bound, check_certified
 from .dynamic import constants, seeds
 from .exchange import ProvedSchedule, exchanged
+from .formulation import schedule_problem
 from .polish import Polished, polish
-from .problem import ScheduleProblem, ends, schedule_problem
+from .problem import ScheduleProblem, ends
 
 #: Largest number of designs from which the search begins.
 _DESIGNS = 8
