@@ -119,7 +119,9 @@ def path(
     result = path_result(judged, chosen)
 
     def command(claim: PathVerdictData) -> str:
-        """Return the command that shows a violated claim."""
+        """Return the command that shows a violated claim; empty if the case is optimised along its path."""
+        if loaded.over_path is not None:
+            return ""  # evaluate refuses such a case: its F needs the feed at a point of the path
         pose, *further = violating_poses(judged, claim)
         own = settings_at(judged, claim)
         shown = loaded.replace(own) if own else loaded

@@ -46,8 +46,8 @@ def path_summary(
     Args:
         case: the case.
         result: the verdicts.
-        command: function that returns the command that shows a violated claim; None for a page, which lists claims only
-            in tables.
+        command: function that returns the command that shows a violated claim, empty without such a command; None for a
+            page, which lists claims only in tables.
     """
     path, answer = result.path, verdict_words(result)
     limited = [each for each in path.claims if each.limit is not None]
@@ -56,8 +56,8 @@ def path_summary(
     wrong = first_refuted(result)
     if wrong is not None and wrong.fault is not None:
         yield Line(fault_words(wrong, wrong.fault), label="first violation", tone=Tone.FAULT)
-        if command is not None:
-            yield Line(command(wrong), label="see it with", is_command=True)
+        if shown := command and command(wrong):
+            yield Line(shown, label="see it with", is_command=True)
     for each in path.claims:
         if each.sense is None:
             after = f": {each.reason}" if each.reason else ""

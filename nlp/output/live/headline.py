@@ -15,7 +15,7 @@ from ...results.data import OutcomeData, SolveResult
 from ...results.objective import unit_of_objective
 from ...results.result import result_of
 from ...solver.solution import Solution
-from ...words.lines import headline, task_lines
+from ...words.lines import headline, objective_lines, task_lines
 from ...words.numbers import number
 from ...words.text import Line
 from ..report.markup import Markup, join_markup, paragraphs, tag
@@ -99,11 +99,11 @@ def _value_markup(nlp: Nlp, x: FloatArray) -> Markup:
 
 
 def task_of(case: Case, solution: Solution | None) -> Markup:
-    """Return the task in words."""
+    """Return the meaning of F, if it is not a sum of squared rates, and the task in words."""
     result = None if solution is None else result_of(solution)
-    lines: list[Line] = []
+    lines = [*objective_lines(case)]
     if isinstance(result, SolveResult) and result.robot is not None and result.robot.task is not None:
-        lines = [*task_lines(result.robot.task, case.units)]
+        lines += [*task_lines(result.robot.task, case.units)]
     return task_markup(lines)
 
 

@@ -50,8 +50,9 @@ def dimensions_table(case: Case) -> Markup:
 
 
 def refuting_place(claim: str, pose: str, command: str) -> Markup:
-    """Return a violated claim with its pose, and the command that shows the pose."""
-    return join_markup([tag("h3", in_words(claim)), tag("p", f"At {pose}."), shown_command(command)])
+    """Return a violated claim with its pose, and the command that shows the pose if there is one."""
+    shown = [shown_command(command)] if command else []
+    return join_markup([tag("h3", in_words(claim)), tag("p", f"At {pose}."), *shown])
 
 
 def in_words(claim: str) -> str:
