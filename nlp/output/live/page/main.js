@@ -19,7 +19,7 @@ const data = JSON.parse(byId("data").textContent ?? "{}");
 let state = null;
 const colours = () => {
   const style = getComputedStyle(document.documentElement), get = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`).trim();
-  return { ink: get("ink"), muted: get("muted"), line: get("line"), halo: get("back"), purple: get("purple"), rail: get("rail"), joint: get("joint"), baseFace: get("base-face"), platformFace: get("platform-face"), baseEdge: get("base-edge"), platformEdge: get("platform-edge"), bad: get("bad"), cone: get("cone") };
+  return { ink: get("ink"), muted: get("muted"), line: get("line"), halo: get("back"), purple: get("purple"), rail: get("rail"), joint: get("joint"), baseFace: get("base-face"), platformFace: get("platform-face"), baseEdge: get("base-edge"), platformEdge: get("platform-edge"), bad: get("bad"), cone: get("cone"), mostNegative: get("most-negative"), negative: get("negative"), zero: get("zero"), positive: get("positive"), mostPositive: get("most-positive") };
 };
 let palette = colours();
 const picture = new Picture(/** @type {HTMLCanvasElement} */ (byId("robot")), data.camera, () => draw());
@@ -67,7 +67,7 @@ const draw = () => {
   const twist = data.is_stated && (!track || track.schedule) ? [...p.slice(data.tasks[task].twist, data.tasks[task].twist + 6)] : null;
   const axes = axesOf(picture.camera);
   if (!picture.fitted.length) picture.fitted = [...extentOf(robot, data.scene, twist), ...(track?.way ?? [])];
-  const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb)), twist, cones: conesOf(view, data, coneLimit) });
+  const pieces = piecesOf(robot, data.scene, { axes, colours: palette, limbColour: (link) => colourOf(values.part(link.limb), palette), twist, cones: conesOf(view, data, coneLimit) });
   if (track) pieces.push(...track.pieces(axes, palette)), pieces.sort((a, b) => a.depth - b.depth);
   /** @type {Map<string, { text: string, at: any }>} */
   const labels = new Map();

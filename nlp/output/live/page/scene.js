@@ -13,13 +13,14 @@ import { cross, norm, plus, unitOf, dot } from "./numbers.js";
 
 /** Pieces of a line, which are sorted on their own. */
 const PARTS = 6;
-/** Stops of the colours of rates and forces: negative, zero, positive. */
-const STOPS = [[8, 81, 156], [63, 134, 196], [154, 163, 171], [224, 138, 60], [179, 71, 0]];
+/** Names of the colours of rates and forces, from -1 to 1. */
+const STOPS = ["mostNegative", "negative", "zero", "positive", "mostPositive"];
 
-/** Colour of a value between -1 and 1; that of zero where there is no value. @param {number} part */
-export const colourOf = (part) => {
+/** Colour of a value between -1 and 1; that of zero where there is no value. @param {number} part @param {Record<string, string>} colours of the form #rrggbb */
+export const colourOf = (part, colours) => {
+  const stops = STOPS.map((name) => [1, 3, 5].map((k) => parseInt(colours[name].slice(k, k + 2), 16)));
   const at = (Math.max(-1, Math.min(1, Number.isNaN(part) ? 0 : part)) + 1) * 2, low = Math.min(3, Math.floor(at)), share = at - low;
-  return `rgb(${STOPS[low].map((each, k) => Math.round(each + share * (STOPS[low + 1][k] - each))).join(",")})`;
+  return `rgb(${stops[low].map((each, k) => Math.round(each + share * (stops[low + 1][k] - each))).join(",")})`;
 };
 
 /** Directions to the right, upwards and to the viewer, from azimuth and elevation in degrees. @param {{ azimuth: number, elevation: number }} camera @returns {Axes} */
