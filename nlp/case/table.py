@@ -201,7 +201,8 @@ def _sentence(fault: ErrorDetails, context: Mapping[str, Any]) -> str:
         case "unknown_key" | "reason":
             sentence = str(context["fault"])
         case "literal_error":
-            sentence = f"must be one of {context['expected']}"
+            one_of = "one of " * ("," in context["expected"] or " or " in context["expected"])
+            sentence = f"must be {one_of}{context['expected']}"
         case "string_type" if key in _FILES:
             sentence = f"must be the name of a CSV file; for tables, write [[{_FILES[key]}]]"
         case "list_type" if key in _FORMS:

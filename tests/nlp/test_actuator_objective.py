@@ -139,7 +139,7 @@ def test_a_case_with_an_objective_is_the_same_when_it_is_written_and_read_again(
             "objective.minimise needs no task: remove [[task]]",
         ),
         (("[objective]", 2 * TASK + "[objective]"), "at most once with objective.minimise"),
-        (("minimise", "maximise"), "no such key"),
+        (("minimise", "maximise"), "must be 'smallest_singular_value'"),
     ],
     ids=["no load", "no motion", "unknown", "sense", "two tasks", "maximise"],
 )

@@ -226,7 +226,7 @@ def test_an_interrupted_tradeoff_keeps_what_is_solved(case: str, tmp_path: Path)
     assert rest == {(Status.INTERRUPTED, None, (None,), None)}
     words = f"stopped before the end: {len(solved)} of 200 values are solved"
     assert words in plain(ended.shown)
-    assert words in files["page"].read_text(encoding="utf-8")
+    assert f"{words[0].upper()}{words[1:]}." in files["page"].read_text(encoding="utf-8")
     rows = rows_of(files["csv"].read_text(encoding="utf-8"))
     assert [row["status"] for row in rows] == [point.status.value for point in points]
 

@@ -245,7 +245,7 @@ def test_a_report_without_maps_has_no_plotly(cli: Run, tmp_path: Path) -> None:
     assert '<script type="text/plain" id="plotly"></script>' in text
 
 
-@pytest.mark.parametrize("command", ["view", "report"])
+@pytest.mark.parametrize("command", ["view", pytest.param("report", marks=pytest.mark.soak)])
 def test_the_motion_of_a_task_is_its_screw_motion(
     opened: Callable[..., Any], cli: Run, tmp_path: Path, command: str
 ) -> None:

@@ -505,7 +505,7 @@ def test_tables_curves_and_pages_have_the_settings(cli: Run, tmp_path: Path, mon
     for name in ("setting x1", "setting turn", "rate of x1", "rate of turn"):
         assert f'id="{name} {name.rpartition(" ")[2]}"' in svg
         assert f"{name[0].upper()}{name[1:]}:" in page
-    assert re.search(r"x1</th><td[^>]*>(<[^>]*>)*24(<[^>]*>)* to 26\.5", page)
+    assert re.search(r"x1</th><td[^>]*>(<[^>]*>)*24(<[^>]*>)* \.\. 26\.5", page)
     assert "the live view does not move x1 along a path" in page
 
 

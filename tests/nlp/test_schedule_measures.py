@@ -114,6 +114,7 @@ def test_speeds_and_powers_equal_those_of_the_inverse_jacobian(tmp_path: Path, m
         assert value == pytest.approx(expected.max(), rel=1e-9)
 
 
+@pytest.mark.soak
 def test_mean_longest_strut_is_below_that_of_the_shortest_worst_one(tmp_path: Path) -> None:
     means = []
     for over in ("mean", "worst"):
@@ -130,6 +131,7 @@ def test_mean_longest_strut_is_below_that_of_the_shortest_worst_one(tmp_path: Pa
 _RADIUS = 'x1 = { min = 18, max = 34, per = "path", rate = 0.5 }'
 
 
+@pytest.mark.soak
 def test_two_settings_are_better_than_each_alone(tmp_path: Path) -> None:
     both = solve(load_case(str(_written(tmp_path, ("x1 = 26.5", _RADIUS), count=50)))).schedule
     assert both is not None

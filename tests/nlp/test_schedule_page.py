@@ -230,6 +230,7 @@ def test_a_dimension_moves_along_the_path(
 
 @needs_compiler
 @pytest.mark.browser
+@pytest.mark.soak
 def test_a_smallest_force_has_its_value_and_its_table(opened: Callable[..., Any], cli: Run, tmp_path: Path) -> None:
     case = _written(tmp_path, *_minimised("actuator_force", "worst", _ANY_FORCE), count=12)
     page = tmp_path / "page.html"
