@@ -50,8 +50,14 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
     if case.model.locked:
         joints = case.model.locked
         who = f"actuated joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
-        yield Line(f"F is taken with {who} locked at each point of the path", label="note")
-    yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
+        what = "J" if case.tasks[0].measure == SMALLEST else "F"
+        yield Line(f"{what} is taken with {who} locked at each point of the path", label="note")
+    words = (
+        f"locally optimal: {search_words(schedule)}"
+        if schedule.names or schedule.design
+        else "evaluated: no value is free"
+    )
+    yield Line(words, label="status")
     if schedule.bound is not None and schedule.gap is not None:
         stopped = "" if schedule.reason is None else f"; stopped: {schedule.reason}"
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %{stopped})"
@@ -117,6 +123,13 @@ def gain_words(schedule: ScheduleData) -> str:
         return f"no constant {names} keeps the limits"
     gain = schedule.constant.gain
     return f"{_signed(schedule, gain) if gain else 'no gain'} compared with the best constant {names}"
+
+
+def search_words(schedule: ScheduleData) -> str:
+    """Return the methods of the search, and what may be better than its result."""
+    if schedule.names:
+        return "dynamic programming, then Ipopt; another schedule may be better"
+    return "searches by Ipopt; another design may be better"
 
 
 def _gain(schedule: ScheduleData) -> str:

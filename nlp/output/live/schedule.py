@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -14,7 +15,8 @@ from ....models import FloatArray
 from ....models.instance import length_of
 from ...case.case import Case
 from ...case.pathfile import TURN
-from ...case.pose import Free, OverPoses
+from ...case.pose import Free, OverPoses, ends_of
+from ...path.settings import changing_of
 from ...path.waypoints import Waypoints
 from ...program.nlp import Nlp
 from ...results.objective import unit_of_objective
@@ -26,7 +28,14 @@ from ...solver.schedule.search import at_point
 from ...solver.solution import Solution
 from ...view.source import view_or_drawing
 from ...words.numbers import number
-from ...words.schedule import gain_words, no_schedule_line, objective_name, schedule_lines, schedule_task_lines
+from ...words.schedule import (
+    gain_words,
+    no_schedule_line,
+    objective_name,
+    schedule_lines,
+    schedule_task_lines,
+    search_words,
+)
 from .page import LivePage, LiveParts, Track, live_page, live_parts
 from .posing import pose_places, with_free_pose
 
@@ -113,12 +122,18 @@ def _along(solution: Solution) -> _Along:
     return _Along(
         schedule=schedule,
         problem=replace(problem, points=points, margins=None),
-        d=np.array([units.to_internal(schedule.design[each.name], each.dimension) for each in problem.design]),
+        d=_design(problem, schedule.design),
         s=schedule.values * factors,
         units=factors,
         seconds=seconds,
         shown=np.unique(np.linspace(0, count - 1, min(count, _POINTS)).round().astype(np.intp)),
     )
+
+
+def _design(problem: ScheduleProblem, values: Mapping[str, float]) -> FloatArray:
+    """Return the design (n,) in the units of computations, from values by name in the case's units."""
+    units = problem.case.units
+    return np.array([units.to_internal(values[each.name], each.dimension) for each in problem.design])
 
 
 def _case_along(along: _Along) -> Case:
@@ -139,13 +154,11 @@ def _case_along(along: _Along) -> Case:
 
 def _largest_turn(along: _Along) -> float:
     """Return the largest rotation of the platform along the path, radians, over the whole range of its turn."""
-    q, path = along.schedule.quaternions, along.problem.case.path
-    if path is None or path.tool is None:
+    q, changing = along.schedule.quaternions, changing_of(along.problem.case)
+    if changing.axis is None:
         return float(2 * np.arccos(np.clip(np.abs(q[:, 0]), 0.0, 1.0)).max())
-    turn, axis = path.tool.turn, np.array(path.tool.axis) / np.linalg.norm(path.tool.axis)
-    low, high = (turn.lower, turn.upper) if isinstance(turn, Free) else (turn, turn)
-    half = 0.5 * np.linspace(low, high, _TURNS)
-    real = np.outer(q[:, 0], np.cos(half)) - np.outer(q[:, 1:] @ axis, np.sin(half))
+    half = 0.5 * np.linspace(*ends_of(changing.ranges.get(TURN, changing.turn)), _TURNS)
+    real = np.outer(q[:, 0], np.cos(half)) - np.outer(q[:, 1:] @ changing.axis, np.sin(half))
     return float(2 * np.arccos(np.clip(np.abs(real), 0.0, 1.0)).max())
 
 
@@ -201,7 +214,7 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
     rates = schedule.rates.tolist()
     numbers = dict(zip(nlp.case.scalars, nlp.program.places.numbers, strict=True))
     table = base64.b64encode(gzip.compress(schedule.to_csv().encode(), mtime=0)).decode("ascii")
-    tool = None if case.path is None else case.path.tool
+    changing = changing_of(case)
     return {
         "settings": [
             {
@@ -227,8 +240,8 @@ def _schedule_data(solution: Solution, along: _Along, nlp: Nlp, places: list[int
             "values": along.d.tolist(),
         },
         "feeds": problem.points.feeds[along.shown].tolist(),
-        "axis": None if tool is None else (np.array(tool.axis) / np.linalg.norm(tool.axis)).tolist(),
-        "turn": 0.0 if tool is None or isinstance(tool.turn, Free) else float(tool.turn),
+        "axis": None if changing.axis is None else changing.axis.tolist(),
+        "turn": changing.turn,
         "follows": [each.follows for each in case.tasks],
         "weights": [each.weight for each in case.tasks],
         "measure": case.tasks[0].measure,
@@ -252,7 +265,8 @@ def _texts(solution: Solution, schedule: Schedule) -> dict[str, Any]:
     gain = gain_words(data)
     bound = "" if data.statement is None else f"{data.statement} (proved)"
     proved = "" if data.proved is None else "limits proved at every point of the path" if data.proved else ""
-    words = ["found by the program, with dynamic programming and Ipopt; another schedule may be better", proved, bound]
+    free = bool(schedule.names or schedule.design)
+    words = [f"found by the program: {search_words(data)}" if free else "no value is free", proved, bound]
     held = None
     if data.constant is not None:
         held = {
@@ -275,9 +289,7 @@ def _constant(along: _Along) -> dict[str, Any] | None:
     constant, problem = along.schedule.constant, along.problem
     if constant is None or not along.schedule.names:
         return None
-    row = constant.values * along.units
-    units = along.schedule.units
-    d = np.array([units.to_internal(constant.design[each.name], each.dimension) for each in problem.design])
+    row, d = constant.values * along.units, _design(problem, constant.design)
     found = problem.at(d, np.repeat(row[None, :], len(along.s), axis=0))
     F = along.schedule.sign * problem.combined(found.objective)
     return {"row": row.tolist(), "design": d.tolist(), "F": F[along.shown].tolist(), "value": constant.value}

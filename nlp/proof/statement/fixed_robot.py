@@ -77,7 +77,7 @@ def check_changing(case: Case, names: Sequence[str]) -> None:
         names: dimensions that change along the path: components of the robot's parameters.
 
     Raises:
-        CaseError: another dimension is free, the robot does not have six straight legs, or a limit is about home.
+        CaseError: another dimension is free; or see :func:`check_moving`.
     """
     case.fixed_parameters("a path is judged with fixed dimensions", names)
     check_moving(case, names)
@@ -91,7 +91,8 @@ def check_moving(case: Case, names: Sequence[str]) -> None:
         names: dimensions that change along the path: components of the robot's parameters.
 
     Raises:
-        CaseError: the robot does not have six straight legs, or a limit is about home.
+        CaseError: a dimension changes that is no coordinate of an actuated joint, and the robot does not have six
+            straight legs; or a limit is about home.
     """
     if not names:
         return

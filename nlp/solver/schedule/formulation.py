@@ -94,13 +94,12 @@ def schedule_problem(case: Case) -> ScheduleProblem:
     check_home(case, [each.name for each in settings if each.name != TURN])
     point = SX.sym("point", _POINT)
     position, rotation, feed = point[:3], ca.reshape(point[3:12], 3, 3), point[12:15]
-    turned, axis = rotation, SX([0.0, 0.0, 1.0])
-    if case.path is not None and case.path.tool is not None:
-        local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
-        axis = rotation @ SX(local.tolist())
-        turn = case.path.tool.turn
-        angle = s[[each.name for each in settings].index(TURN)] if isinstance(turn, Free) else SX(turn)
-        turned = rotation @ matrix_from_axis_angle(SX(local.tolist()), angle)
+    turned, axis, changing = rotation, SX([0.0, 0.0, 1.0]), changing_of(case)
+    if changing.axis is not None:
+        local = SX(changing.axis.tolist())
+        axis = rotation @ local
+        angle = s[[each.name for each in settings].index(TURN)] if TURN in case.settings else SX(changing.turn)
+        turned = rotation @ matrix_from_axis_angle(local, angle)
     substitution = Substitution(parameters, SX(0, 1), turned, position, reference_of(case))
     twists = [_twist(task, position, feed, axis) for task in case.tasks]
     length = SX(case.characteristic_length)

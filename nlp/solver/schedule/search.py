@@ -23,6 +23,7 @@ from ...case.settings import Search
 from ...case.task import Method, Sense, Task
 from ...interruption import Milestone, is_requested, reached
 from ...path.path import Poses
+from ...path.settings import changing_of
 from ...program.formulation import formulate
 from ..compromise import solution_of_one_task
 from ..multistart import solve_program
@@ -223,12 +224,10 @@ def at_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray, index: int 
         ]
         for item in case.model.parameters
     }
-    rotation, axis = points.rotations[index], np.array([0.0, 0.0, 1.0])
-    if case.path is not None and case.path.tool is not None:
-        local = np.array(case.path.tool.axis) / np.linalg.norm(case.path.tool.axis)
-        turn = case.path.tool.turn
-        axis = rotation @ local
-        rotation = rotation @ rotation_matrix(local * (values[TURN] if isinstance(turn, Free) else float(turn)))
+    rotation, axis, changing = points.rotations[index], np.array([0.0, 0.0, 1.0]), changing_of(case)
+    if changing.axis is not None:
+        axis = rotation @ changing.axis
+        rotation = rotation @ rotation_matrix(changing.axis * values.get(TURN, changing.turn))
     p = points.positions[index]
     twists = {
         "feed": (0.0, 0.0, 0.0, *points.feeds[index]),
