@@ -66,11 +66,11 @@ def task_starter(model: Model, robot_file: str | None = None) -> str:
     ends = [units.shown(value, item.dimension) for value in starter_values(item)]
     listed = _holes(ends, [units.shown(width, item.dimension) for width in free_widths(item)])
     lines = [
-        f'title = "My {model.name}, set anew for each task"',
+        f'title = "My {model.name}, reset for each task"',
         "",
         *robot_lines(model, robot_file, home.arm),
         "",
-        '# A number is a fixed value. per = "task" sets the dimension anew for every task, as pins in a plate do.',
+        '# A number is a fixed value. per = "task" resets the dimension for every task, as pins in a plate do.',
         f"# For the holes of a plate, list the values: {listed}",
         "[robot.parameters]",
         *(

@@ -24,6 +24,7 @@ from screwsynth.nlp.case.pose import Free, OverPoses
 from screwsynth.nlp.output.pictures.schedules import schedule_figure
 from screwsynth.nlp.path.reader import path_without_settings
 from screwsynth.nlp.path.waypoints import waypoints
+from screwsynth.nlp.results.schedule import schedule_data
 from screwsynth.nlp.results.schema import result_schema
 from screwsynth.nlp.solver.schedule.cells import cell_bound
 from screwsynth.nlp.solver.schedule.dynamic import Grid, best_path, seeds, sliding_maximum
@@ -31,6 +32,8 @@ from screwsynth.nlp.solver.schedule.formulation import schedule_problem
 from screwsynth.nlp.solver.schedule.polish import polish
 from screwsynth.nlp.solver.schedule.problem import ScheduleProblem
 from screwsynth.nlp.system.jsonvalues import json_data
+from screwsynth.nlp.words.schedule import schedule_lines
+from screwsynth.nlp.words.text import Line
 
 _DEGREE = math.pi / 180
 _YAW = Path("cases/hexapod-yaw.toml").resolve()
@@ -636,3 +639,19 @@ def _solved(text: str, setting: str) -> Solution:
     assert solution.schedule is not None, text
     assert solution.schedule.names == (setting,)
     return solution
+
+
+def test_words_name_only_methods_that_were_used() -> None:
+    """Without a setting there is no dynamic programming; without a free value there is no search."""
+    case = load_case("hexapod-yaw", {"turn": 0})
+    fixed, free = case, replace(case, parameters={**case.parameters, "x1": Free(26.0, 27.0)})
+    words = {}
+    for name, each in (("fixed", fixed), ("free", free)):
+        schedule = solve(each, starts=1).schedule
+        assert schedule is not None
+        lines = schedule_lines(each, schedule_data(schedule))
+        words[name] = next(line.words for line in lines if isinstance(line, Line) and line.label == "status")
+    assert words == {
+        "fixed": "evaluated: no value is free",
+        "free": "locally optimal: searches by Ipopt; another design may be better",
+    }
