@@ -655,3 +655,13 @@ def test_words_name_only_methods_that_were_used() -> None:
         "fixed": "evaluated: no value is free",
         "free": "locally optimal: searches by Ipopt; another design may be better",
     }
+
+
+def test_length_of_the_tool_axis_does_not_matter() -> None:
+    """A stated axis has any length but zero, also one whose square is 0 in floating point."""
+    case, s = load_case("hexapod-yaw"), np.full((200, 1), -0.5)
+    assert case.path is not None
+    assert case.path.tool is not None
+    short = replace(case, path=replace(case.path, tool=replace(case.path.tool, axis=(0.0, 0.0, 1e-200))))
+    stated, found = (schedule_problem(each).at(np.zeros(0), s).objective for each in (case, short))
+    np.testing.assert_array_equal(found, stated)
