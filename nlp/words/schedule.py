@@ -51,7 +51,7 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
         joints = case.model.locked
         who = f"actuated joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
         yield Line(f"F is taken with {who} locked at each point of the path", label="note")
-    yield Line("locally optimal: dynamic programming, then Ipopt; another schedule may be better", label="status")
+    yield Line(_status(schedule), label="status")
     if schedule.bound is not None and schedule.gap is not None:
         stopped = "" if schedule.reason is None else f"; stopped: {schedule.reason}"
         words = f"{schedule.statement} (proved, gap {100 * schedule.gap:.2g} %{stopped})"
@@ -117,6 +117,15 @@ def gain_words(schedule: ScheduleData) -> str:
         return f"no constant {names} keeps the limits"
     gain = schedule.constant.gain
     return f"{_signed(schedule, gain) if gain else 'no gain'} compared with the best constant {names}"
+
+
+def _status(schedule: ScheduleData) -> str:
+    """Return what the search shows of the answer; without a setting or a free dimension there was no search."""
+    if schedule.names:
+        return "locally optimal: dynamic programming, then Ipopt; another schedule may be better"
+    if schedule.design:
+        return "locally optimal: Ipopt; another design may be better"
+    return "evaluated: all dimensions and settings are fixed"
 
 
 def _gain(schedule: ScheduleData) -> str:

@@ -636,3 +636,15 @@ def _solved(text: str, setting: str) -> Solution:
     assert solution.schedule is not None, text
     assert solution.schedule.names == (setting,)
     return solution
+
+
+def test_a_fixed_turn_is_evaluated_and_no_search_is_claimed(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("solve", str(_written(tmp_path)), "--set", "turn=5")
+    words = " ".join(out.split())
+    assert code == 0
+    assert "(no setting changes) status evaluated: all dimensions and settings are fixed" in words
+    assert "another schedule may be better" not in words
+
+
+def test_an_unknown_name_is_refused_with_the_turn_among_the_allowed_names(tmp_path: Path, cli: Run) -> None:
+    assert "p_z, angle, axis, rpy, quaternion, turn;" in _refusal(cli, "solve", str(_written(tmp_path)), "--set", "x9=1")
