@@ -647,4 +647,6 @@ def test_a_fixed_turn_is_evaluated_and_no_search_is_claimed(tmp_path: Path, cli:
 
 
 def test_an_unknown_name_is_refused_with_the_turn_among_the_allowed_names(tmp_path: Path, cli: Run) -> None:
-    assert "p_z, angle, axis, rpy, quaternion, turn;" in _refusal(cli, "solve", str(_written(tmp_path)), "--set", "x9=1")
+    assert "p_z, angle, axis, rpy, quaternion, turn;" in _refusal(
+        cli, "solve", str(_written(tmp_path)), "--set", "x9=1"
+    )
