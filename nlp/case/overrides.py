@@ -131,7 +131,8 @@ def _allowed(name: str, tables: Mapping[str, Any], places: Mapping[str, _Place],
         "limits such as limits.leg_length.max",
         *(f"values of tasks such as {each}" for each in [name for name in tasks if name.endswith("pitch")][:1]),
     ]
-    hint = nearest(name, [*places, *rotations], [*ends, *tasks])
+    turn = [TURN] if _tool_of(tables, TURN) is not None else []
+    hint = nearest(name, [*places, *rotations, *turn], [*ends, *tasks])
     return f"{hint}; also {', '.join(others)}"
 
 

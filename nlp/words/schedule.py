@@ -55,7 +55,7 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
     words = (
         f"locally optimal: {search_words(schedule)}"
         if schedule.names or schedule.design
-        else "evaluated: no value is free"
+        else "evaluated: all dimensions and settings are fixed"
     )
     yield Line(words, label="status")
     if schedule.bound is not None and schedule.gap is not None:

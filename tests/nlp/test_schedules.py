@@ -652,7 +652,7 @@ def test_words_name_only_methods_that_were_used() -> None:
         lines = schedule_lines(each, schedule_data(schedule))
         words[name] = next(line.words for line in lines if isinstance(line, Line) and line.label == "status")
     assert words == {
-        "fixed": "evaluated: no value is free",
+        "fixed": "evaluated: all dimensions and settings are fixed",
         "free": "locally optimal: searches by Ipopt; another design may be better",
     }
 
@@ -665,3 +665,17 @@ def test_length_of_the_tool_axis_does_not_matter() -> None:
     short = replace(case, path=replace(case.path, tool=replace(case.path.tool, axis=(0.0, 0.0, 1e-200))))
     stated, found = (schedule_problem(each).at(np.zeros(0), s).objective for each in (case, short))
     np.testing.assert_array_equal(found, stated)
+
+
+def test_a_fixed_turn_is_evaluated_and_no_search_is_claimed(tmp_path: Path, cli: Run) -> None:
+    code, out, _ = cli("solve", str(_written(tmp_path)), "--set", "turn=5")
+    words = " ".join(out.split())
+    assert code == 0
+    assert "(no setting changes) status evaluated: all dimensions and settings are fixed" in words
+    assert "another schedule may be better" not in words
+
+
+def test_an_unknown_name_is_refused_with_the_turn_among_the_allowed_names(tmp_path: Path, cli: Run) -> None:
+    assert "p_z, angle, axis, rpy, quaternion, turn;" in _refusal(
+        cli, "solve", str(_written(tmp_path)), "--set", "x9=1"
+    )
