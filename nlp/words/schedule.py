@@ -88,8 +88,13 @@ def schedule_lines(case: Case, schedule: ScheduleData) -> Iterator[Line | TextTa
         head = ("setting", "unit", "smallest", "largest", "best constant", "rate", "largest rate")
         yield TextTable(head, tuple(rows), "settings")
     if schedule.design:
-        design = tuple((name, number(value)) for name, value in schedule.design.items())
-        yield TextTable(("dimension", "value"), design, "design")
+        units = {
+            name: case.units.label(item.dimension)
+            for item in case.model.parameters
+            for name in case.component_names(item)
+        }
+        design = tuple((name, number(value), units[name]) for name, value in schedule.design.items())
+        yield TextTable(("dimension", "value", "unit"), design, "design", with_unit=(1,))
 
 
 def schedule_table(schedule: ScheduleData) -> TextTable:
