@@ -74,7 +74,7 @@ def path(
     from ..path.reader import options_of, path_of_case, read_path
     from ..path.settings import changing_of
     from ..proof.workspace.path_judge import TIME_LIMIT, judge_path
-    from ..results.path import path_result, settings_at, violating_poses
+    from ..results.path import path_result, violating_poses
     from ..words.poses import evaluate_command
     from .proofs import path_premises, path_proof_text, proof_record
 
@@ -123,12 +123,7 @@ def path(
         if loaded.over_path is not None:
             return ""  # evaluate refuses such a case: its F needs the feed at a point of the path
         pose, *further = violating_poses(judged, claim)
-        own = settings_at(judged, claim)
-        shown = loaded.replace(own) if own else loaded
-        further = [] if own else further
-        return evaluate_command(
-            case, shown, {**chosen, **own}, pose, RotationForm.RPY, claim=claim.name, further=further
-        )
+        return evaluate_command(case, loaded, chosen, pose, RotationForm.RPY, claim=claim.name, further=further)
 
     @cache
     def picture() -> contents.PathPicture:

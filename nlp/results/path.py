@@ -283,23 +283,6 @@ def violating_poses(judged: "Judgement", claim: PathVerdictData) -> Iterator[Wor
         yield claim.pose
 
 
-def settings_at(judged: "Judgement", claim: PathVerdictData) -> dict[str, float]:
-    """Return the dimensions that change along a path, in the case's units, where it refutes a claim.
-
-    The place is the first known one, or the worst known one without it.
-    """
-    settings, place = judged.path.settings, claim.fault or claim
-    if settings.values is None or place.segment is None or place.parameter is None:
-        return {}
-    values = settings.at(np.array([place.segment]), np.array([place.parameter]))[0].tolist()
-    case = judged.case
-    kinds = {name: item.dimension for item in case.model.parameters for name in item.components}
-    return {
-        case.parameter_name(name): case.units.shown(value, kinds[name])
-        for name, value in zip(settings.names, values, strict=True)
-    }
-
-
 def _knots_data(units: "Units", knots: "Knots") -> PathKnotsData:
     """Return the summary of the knots: their number, the number of reached knots, and the proved deviation."""
     within, deviation = (

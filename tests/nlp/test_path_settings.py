@@ -327,17 +327,17 @@ def test_commands_refuse_what_settings_do_not_support(
     refusal_of(cli("path", file), "limits.base_joint_angle.about", "home has no x1")
 
 
-def test_a_refuted_claim_names_the_dimension_in_its_command(
-    cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_command_is_printed_that_evaluate_refuses(cli: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A case that is optimised along its path has no F at one pose, so evaluate refuses it."""
     (tmp_path / "s.csv").write_text(written("x,y,z,roll,pitch,yaw,x1,t", RADIUS_ROWS))
     monkeypatch.chdir(tmp_path)
     file = str(saved(tmp_path / "case.toml", moving(limits={"leg_length": {"max": 28}}).to_toml()))
-    code, out, err = cli("path", file)
+    code, out, err = cli("path", file, "--html", "page.html")
     assert (code, err) == (1, "")
-    ((*_, last),) = commands_in(out, "see it with")
-    assert "x1=" in out
-    assert last.startswith("rpy=")
+    assert "first violation" in out
+    assert commands_in(out, "see it with") == []
+    assert 'aria-label="Command"' not in Path("page.html").read_text()
+    refusal_of(cli("evaluate", file), "x1 changes along the path, but this command takes one robot")
 
 
 def test_a_fixed_turn_is_part_of_every_path() -> None:
