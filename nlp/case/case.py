@@ -395,6 +395,21 @@ class Case(Whole, Shown):
         """Return the names of a parameter's components in this case."""
         return tuple(self.parameter_name(name) for name in parameter.components)
 
+    def with_components(self, values: Mapping[str, Value]) -> Case:
+        """Return the case with other values of some components of its robot's parameters.
+
+        Args:
+            values: values or ranges by the names of the components in this case, lengths and radians.
+        """
+        parameters = {
+            item.name: [
+                values.get(name, value)
+                for name, value in zip(self.component_names(item), self.components(item.name), strict=True)
+            ]
+            for item in self.model.parameters
+        }
+        return replace(self, parameters=parameters)
+
     @property
     def axis(self) -> FloatArray | None:
         """Fixed unit axis (3,) of the rotation; None for a free axis."""

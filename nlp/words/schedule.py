@@ -126,8 +126,7 @@ def gain_words(schedule: ScheduleData) -> str:
         return ""
     if schedule.constant is None:
         return f"no constant {names} keeps the limits"
-    gain = schedule.constant.gain
-    return f"{_signed(schedule, gain) if gain else 'no gain'} compared with the best constant {names}"
+    return f"{_signed(schedule, schedule.constant.gain)} compared with the best constant {names}"
 
 
 def search_words(schedule: ScheduleData) -> str:
@@ -145,11 +144,12 @@ def _gain(schedule: ScheduleData) -> str:
     names = ", ".join(schedule.names)
     if constant is None:
         return f"no constant {names} keeps the limits"
-    gain = _signed(schedule, constant.gain) if constant.gain else "no gain"
-    return f"{number(constant.value)} with the best constant {names}, {gain}"
+    return f"{number(constant.value)} with the best constant {names}, {_signed(schedule, constant.gain)}"
 
 
 def _signed(schedule: ScheduleData, gain: float) -> str:
-    """Return a gain in per cent, with the sign of the change of the objective."""
+    """Return a gain in per cent, with the sign of the change of the objective; ``no gain`` if it is 0."""
+    if not gain:
+        return "no gain"
     change = gain if schedule.constant is None or schedule.value >= schedule.constant.value else -gain
     return f"{100 * change:+.2f} %"

@@ -13,6 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 from builders import Array, Run, output_of, refusal_of, saved, turn_about, unbroken
+from test_free_joints import LEGS
 
 from screwsynth.models import robot_function
 from screwsynth.nlp import CaseError, JointMotion, load_case, solve
@@ -27,29 +28,6 @@ from screwsynth.nlp.solver.scheduled import Schedule
 RAIL, RATE = 0.2, 0.1
 #: Crank and rod of each limb of the planar robot.
 CRANK, ROD = math.hypot(0.5, 1.0), math.hypot(1.1, 0.8)
-LEGS = """
-name = "legs on rails"
-home = [0, 0, 20]
-[dimensions]
-r = { typical = 26.5 }
-[[limb]]
-repeat = { count = 3 }
-points = { B = ["r", 0, 0], A = [11, 3, 20] }
-joints = [
-    { type = "P", at = "B", axis = "x", actuated = true },
-    { type = "U", at = "B", axes = ["x", "y"] },
-    { type = "P", at = "B", axis = "A - B", actuated = true },
-    { type = "S", at = "A" },
-]
-[[limb]]
-repeat = { count = 3 }
-points = { B = ["r*0.9", "-r*0.3", 0], A = [6, -10, 20] }
-joints = [
-    { type = "U", at = "B", axes = ["x", "y"] },
-    { type = "P", at = "B", axis = "A - B", actuated = true },
-    { type = "S", at = "A" },
-]
-"""
 
 
 def turned(limb: int, point: tuple[float, float]) -> Array:

@@ -26,7 +26,7 @@ from ...solver.schedule.formulation import schedule_problem
 from ...solver.schedule.problem import ScheduleProblem
 from ...solver.schedule.search import at_point
 from ...solver.solution import Solution
-from ...view.source import view_or_drawing
+from ...view.source import ViewSource, view_or_drawing
 from ...words.numbers import number
 from ...words.schedule import (
     gain_words,
@@ -78,20 +78,23 @@ class _Along(NamedTuple):
 
 def schedule_page(solution: Solution, command: str) -> LivePage:
     """Return the live page of a solved case with an objective along its path; for arguments see :func:`.live_parts`."""
-    if solution.schedule is None:
-        return live_page(view_or_drawing(_without_schedule(solution)), None, command)
-    along = _along(solution)
-    source = view_or_drawing(_case_along(along))
-    return live_page(source, None, command, _track(solution, along, source.subject.nlp))
+    source, track = _shown(solution)
+    return live_page(source, None, command, track)
 
 
 def schedule_parts(solution: Solution, command: str) -> LiveParts:
     """Return the pieces of the page of :func:`schedule_page`, for the first screen of another page."""
+    source, track = _shown(solution)
+    return live_parts(source, None, command, track)
+
+
+def _shown(solution: Solution) -> tuple[ViewSource, Track | None]:
+    """Return the view of the robot and its track along the path; without a schedule, the first point and None."""
     if solution.schedule is None:
-        return live_parts(view_or_drawing(_without_schedule(solution)), None, command)
+        return view_or_drawing(_without_schedule(solution)), None
     along = _along(solution)
     source = view_or_drawing(_case_along(along))
-    return live_parts(source, None, command, _track(solution, along, source.subject.nlp))
+    return source, _track(solution, along, source.subject.nlp)
 
 
 def _without_schedule(solution: Solution) -> Case:
@@ -141,14 +144,9 @@ def _case_along(along: _Along) -> Case:
     problem = along.problem
     start = at_point(problem, along.d, along.s[0])
     settings = {each.name: Free(each.lower, each.upper) for each in problem.settings if each.name != TURN}
-    parameters: dict[str, Any] = {}
-    for item in start.model.parameters:
-        names = start.component_names(item)
-        values = [settings.get(name, value) for name, value in zip(names, start.components(item.name), strict=True)]
-        parameters[item.name] = values if len(values) > 1 else values[0]
     size = length_of(start.model, start.fixed_parameters("the first point has fixed dimensions").tolist())
     # The page evaluates points of the path, and needs no optimum of the pose.
-    posed = replace(start, parameters=parameters, search=start.search.but(1, None))
+    posed = replace(start.with_components(settings), search=start.search.but(1, None))
     return with_free_pose(posed, problem.points.positions, _largest_turn(along), size)
 
 

@@ -25,14 +25,8 @@ def ranges_of_settings(case: Case) -> dict[str, Free]:
 
 
 def with_settings(case: Case, values: Mapping[str, Value]) -> Case:
-    """Return a case with other values of its settings."""
-    parameters = {
-        item.name: [
-            values.get(name, value) for name, value in zip(item.components, case.components(item.name), strict=True)
-        ]
-        for item in case.model.parameters
-    }
-    return replace(case, parameters=parameters)
+    """Return a case with other values of its settings, by their names in the robot."""
+    return case.with_components({case.parameter_name(name): value for name, value in values.items()})
 
 
 def part_of(workspace: Workspace, ends: tuple[list[float], list[float]]) -> Workspace:

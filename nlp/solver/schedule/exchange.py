@@ -116,16 +116,8 @@ def _judged(problem: ScheduleProblem, schedule: Polished, path: ProgrammedPath) 
 
 def fixed_design(problem: ScheduleProblem, d: FloatArray) -> Case:
     """Return the case with the values (n,) of its free design, and free settings."""
-    case, values = problem.case, dict(zip((each.name for each in problem.design), d.tolist(), strict=True))
-    parameters = {
-        item.name: [
-            values.get(name, value)
-            for name, value in zip(case.component_names(item), case.components(item.name), strict=True)
-        ]
-        for item in case.model.parameters
-    }
-    single = {name: each[0] if len(each) == 1 else each for name, each in parameters.items()}
-    return replace(case, parameters=single)
+    names = (each.name for each in problem.design)
+    return problem.case.with_components(dict(zip(names, d.tolist(), strict=True)))
 
 
 def with_schedule(case: Case, problem: ScheduleProblem, schedule: Polished, path: ProgrammedPath) -> ProgrammedPath:

@@ -18,7 +18,7 @@ from ....models.mechanism.motions import rotation_matrix
 from ....models.rotation import axis_angle_from_matrix
 from ...case.case import Case
 from ...case.pathfile import TURN
-from ...case.pose import Free, OverPoses, Rotation
+from ...case.pose import OverPoses, Rotation
 from ...case.settings import Search
 from ...case.task import Method, Sense, Task
 from ...interruption import Milestone, is_requested, reached
@@ -217,17 +217,10 @@ def at_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray, index: int 
     values = {
         each.name: float(value) for each, value in zip((*problem.design, *problem.settings), (*d, *s), strict=True)
     }
-    parameters = {
-        item.name: [
-            values[name] if isinstance(value, Free) else value
-            for name, value in zip(case.component_names(item), case.components(item.name), strict=True)
-        ]
-        for item in case.model.parameters
-    }
     rotation, axis, changing = points.rotations[index], np.array([0.0, 0.0, 1.0]), changing_of(case)
     if changing.axis is not None:
         axis = rotation @ changing.axis
-        rotation = rotation @ rotation_matrix(changing.axis * values.get(TURN, changing.turn))
+        rotation = rotation @ rotation_matrix(changing.axis * values.pop(TURN, changing.turn))
     p = points.positions[index]
     twists = {
         "feed": (0.0, 0.0, 0.0, *points.feeds[index]),
@@ -241,8 +234,7 @@ def at_point(problem: ScheduleProblem, d: FloatArray, s: FloatArray, index: int 
         else:
             tasks.append(replace(task, twist=twists[task.follows], follows="") if task.follows else task)
     return replace(
-        case,
-        parameters=parameters,
+        case.with_components(values),
         position=tuple(p.tolist()),
         rotation=Rotation(*axis_angle_from_matrix(rotation)),
         tasks=tuple(tasks),
